@@ -144,5 +144,5 @@ fn npy_bytes(segments: &Array2<u32>) -> Vec<u8> {
 fn grey16_png(map: &Array2<u16>) -> Result<Vec<u8>> {
     let (height, width) = map.dim();
     let samples: Vec<u16> = map.iter().copied().collect();
-    grey_png((width, height), &samples)
+    grey_png(width, height, &samples)
 }

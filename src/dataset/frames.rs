@@ -33,7 +33,7 @@ use super::{Dataset, ImageSource, Root, SetArgs, SkipBad, ready_made, stem};
 use crate::error::{Error, Result};
 use crate::files::reading::{entries, json, json_lines};
 use crate::labels;
-use crate::picture::image_file::format::READ;
+use crate::picture::image_file::format::SUPPORTED_FORMATS;
 use crate::types::{DepthKind, FrameId, Intrinsics, Labels, SegmentName, Segmentation, SetLight};
 
 /// File that lists the frames.
@@ -365,8 +365,9 @@ fn images(root: &Root) -> Result<BTreeMap<FrameId, ImageSource>> {
         let unread = found
             .unsupported_note()
             .map_or(String::new(), |unread| format!("; {unread}"));
-        let problem =
-            format_args!("neither a {FRAMES} nor any {READ} image in this folder{unread}{remedy}");
+        let problem = format_args!(
+            "neither a {FRAMES} nor any {SUPPORTED_FORMATS} image in this folder{unread}{remedy}"
+        );
         return Err(Error::data(folder.display(), problem));
     }
     found.warn_of_unsupported(folder);

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::picture::image_file::format::READ;
+use crate::picture::image_file::format::SUPPORTED_FORMATS;
 use crate::types::images::is_image_ending;
 
 /// Extensions of image formats that are not supported.
@@ -46,7 +46,7 @@ impl ImagePaths {
         };
         let name = first.file_name().unwrap_or_default().to_string_lossy();
         Some(format!(
-            "{count}, as {name}; {READ} expected, so convert them first"
+            "{count}, as {name}; {SUPPORTED_FORMATS} expected, so convert them first"
         ))
     }
 

@@ -10,10 +10,10 @@ use ndarray::Array2;
 use crate::error::{Error, Result};
 use crate::files::reading;
 use crate::picture::ImageFile;
-use crate::picture::image_file::StatedTurn;
+use crate::picture::image_file::StatedOrientation;
 use crate::picture::npy::Npy;
 use crate::picture::raw_png::{RawPng, SampleForm};
-use crate::picture::reading_rule::MOST_PIXELS;
+use crate::picture::reading_rule::MAX_PIXELS;
 use crate::types::Digest;
 
 /// Maximum depth of a pixel, in millimetres: a kilometre, deeper than any room (chosen). A larger value means a wrong unit, such as
@@ -73,7 +73,7 @@ impl DepthFile {
     /// Decodes the depth in millimetres, whatever the size of the map.
     pub(crate) fn decode_any_size(&self, bytes: &[u8]) -> Result<Array2<u32>, String> {
         let size = match self {
-            Self::Png { .. } => RawPng::open(bytes, &[SampleForm::Grey16], MOST_PIXELS)?.size,
+            Self::Png { .. } => RawPng::open(bytes, &[SampleForm::Grey16], MAX_PIXELS)?.size,
             Self::Npy(_) => Npy::parse(bytes)?.size,
         };
         self.decode(bytes, size)
@@ -146,7 +146,7 @@ impl MapPaths {
                 let size = if is_npy(path) {
                     Npy::parse(&bytes).map(|npy| npy.size)
                 } else {
-                    RawPng::open(&bytes, &SampleForm::ALL, MOST_PIXELS)
+                    RawPng::open(&bytes, &SampleForm::ALL, MAX_PIXELS)
                         .map(|png| png.size)
                         .map_err(String::from)
                 };
@@ -163,27 +163,27 @@ impl MapPaths {
         if self.is_empty() {
             return Ok(image);
         }
-        let Some(StatedTurn {
+        let Some(StatedOrientation {
             orientation,
-            stored,
-        }) = image.stated_turn()
+            stored_size,
+        }) = image.stated_orientation()
         else {
             return Ok(image);
         };
         for (path, size) in self.sizes()? {
-            if size != stored {
+            if size != stored_size {
                 let problem = format_args!(
                     "{} × {} pixels (height × width), but its image {} is stored with {} × {} and turned by its EXIF orientation {orientation}; maps must have the size of the image as stored, which is then not turned, or the file no orientation",
                     size.0,
                     size.1,
                     image.place(),
-                    stored.0,
-                    stored.1,
+                    stored_size.0,
+                    stored_size.1,
                 );
                 return Err(Error::data(path.display(), problem));
             }
         }
-        Ok(image.never_turned())
+        Ok(image.ignoring_orientation())
     }
 
     /// Reads the map files without decoding them.
@@ -327,7 +327,7 @@ fn png<T: Clone>(
     size: Size,
     convert: impl Fn(u16) -> T,
 ) -> Result<Vec<T>, String> {
-    let png = RawPng::open(bytes, forms, MOST_PIXELS)?;
+    let png = RawPng::open(bytes, forms, MAX_PIXELS)?;
     check_size(png.size, size)?;
     png.samples(convert)
 }

@@ -9,7 +9,7 @@ use super::root::{Location, Root};
 use super::{DataPlace, Dataset, ImageSource, SetArgs, frames, stem};
 use crate::error::{Error, Result};
 use crate::files::reading::entries;
-use crate::picture::image_file::format::READ;
+use crate::picture::image_file::format::SUPPORTED_FORMATS;
 use crate::types::FrameId;
 
 /// Images at a place, for questions that are asked about every image.
@@ -87,7 +87,8 @@ impl Photographs {
             let unread = found
                 .unsupported_note()
                 .map_or(String::new(), |unread| format!("; {unread}"));
-            let problem = format_args!("no {READ} image in this folder or below{unread}");
+            let problem =
+                format_args!("no {SUPPORTED_FORMATS} image in this folder or below{unread}");
             return Err(Error::data(folder.display(), problem));
         }
         found.warn_of_unsupported(folder);

@@ -37,7 +37,7 @@ impl Picture {
     pub fn note(&self) -> InputNote {
         match self {
             Self::Encoded(file) => file.note(),
-            Self::Drawn(room, rule) => rule.note_of(room.is_light()),
+            Self::Drawn(room, rule) => rule.input_note(room.is_light()),
         }
     }
 
@@ -60,7 +60,7 @@ impl Picture {
         match self {
             Self::Encoded(file) => file.pixels(),
             Self::Drawn(room, rule) => Ok(match room.pixels() {
-                Pixels::Light(light) => Pixels::Light(rule.scaled(light)),
+                Pixels::Light(light) => Pixels::Light(rule.scale_exposure(light)),
                 codes => codes,
             }),
         }

@@ -10,7 +10,7 @@ use clap::Args;
 use super::bank::BankPlace;
 use super::ready_made::{is_known_set, known_sets};
 use super::{DataPlace, RootArgs, SetArgs};
-use crate::picture::reading_rule::{ColourRule, MOST_PIXELS, ReadingRule, Transfer};
+use crate::picture::reading_rule::{ColourRule, MAX_PIXELS, ReadingRule, Transfer};
 use crate::rooms::Rooms;
 use crate::types::{Decides, Family, shell_word};
 
@@ -83,7 +83,7 @@ pub(crate) struct BankArgs {
 #[command(next_help_heading = "Data")]
 pub(crate) struct PixelLimit {
     /// The maximum number of pixels of an image; a larger one is refused before it is decoded
-    #[arg(long, value_name = "N", default_value_t = NonZeroU64::new(MOST_PIXELS).unwrap_or(NonZeroU64::MIN), add = Decides::Nothing)]
+    #[arg(long, value_name = "N", default_value_t = NonZeroU64::new(MAX_PIXELS).unwrap_or(NonZeroU64::MIN), add = Decides::Nothing)]
     pub max_pixels: NonZeroU64,
 }
 
@@ -128,7 +128,7 @@ impl DecodeArgs {
     /// Rule by which images are decoded.
     pub(crate) fn rule(self) -> ReadingRule {
         ReadingRule {
-            most_pixels: self.limit.max_pixels.get(),
+            max_pixels: self.limit.max_pixels.get(),
             colour: self.colour,
             transfer: self.transfer,
             exposure_ev: self.exposure,

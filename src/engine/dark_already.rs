@@ -33,7 +33,7 @@ pub(crate) fn print_note(job: &JobSettings, progress: &Progress) {
         return;
     }
     if job.light.levels == [AxisLevel::L0] {
-        progress.say(
+        progress.print_on_terminal(
             "photographed in the dark: asked as photographed (L0); synthetic levels would add to noise that is in the photographs already, so --levels must name them",
         );
     } else {

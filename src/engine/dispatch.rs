@@ -28,7 +28,7 @@ use crate::images::notes::ImageNotes;
 use crate::images::progress::{LINE_INTERVAL, Progress, TrialProgress};
 use crate::images::timings::{TimedStep, Timings};
 use crate::images::trials::{Item, PreparedGroup, Trial};
-use crate::images::workers::unstarted;
+use crate::images::workers::thread_start_error;
 use crate::store::Store;
 use crate::types::{Digest, FailureKind, Finish, LostAttempts, Record, Reply, SetLight};
 use darkqa_score::answers::record::answered;
@@ -74,7 +74,7 @@ impl Dispatcher<'_> {
         let runtime = runtime::Builder::new_multi_thread()
             .enable_all()
             .build()
-            .map_err(|e| unstarted(&e))?;
+            .map_err(|e| thread_start_error(&e))?;
         let (sender, groups) = mpsc::channel(GROUPS_AHEAD);
         let sink = ReplySink::<I> {
             dispatcher: self,
@@ -349,7 +349,7 @@ impl<I: Item> ReplySink<'_, I> {
                 ),
                 None => (String::new(), ""),
             };
-            progress.say(&format!(
+            progress.print_on_terminal(&format!(
                 "stopping when the requests in flight ({}) have ended{at_most}; interrupt{again} to abort them",
                 in_flight.len()
             ));

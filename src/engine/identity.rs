@@ -52,7 +52,7 @@ pub(crate) fn columns<'a>(
         let content = enhancer_definition(digest, &settings.loading.size);
         (name.as_str().to_owned(), content)
     });
-    let elsewhere = recipe.elsewhere.iter().map(|images| {
+    let elsewhere = recipe.enhanced_images.iter().map(|images| {
         let content = json!({"--enhanced": images.digest()});
         (images.name().as_str().to_owned(), content)
     });

@@ -11,7 +11,7 @@ use crate::engine::folder;
 use crate::engine::manifest;
 use crate::engine::open_run::{OpenRun, answered, lost_for_good, pipeline, truncated};
 use crate::error::{Error, Result};
-use crate::images::enhancement::enhancers::OpenEnhancers;
+use crate::images::enhancement::enhancers::EnhancerModels;
 use crate::images::frames::{input_summary, warn_of_inputs};
 use crate::images::progress::Progress;
 use crate::images::recipes::Maker;
@@ -128,7 +128,7 @@ impl<'a, E: Experiment> Job<'a, E> {
             dark_already::warn(experiment);
         }
         let timings = Timings::default();
-        let enhancers = OpenEnhancers::load(self.files, &settings.loading)?.take()?;
+        let enhancers = EnhancerModels::load(self.files, &settings.loading)?.take()?;
         let mut pipeline = pipeline(experiment, enhancers, None, &timings);
         for plan in &plans {
             pipeline.probe(experiment.sources(), &plan.sources)?;
@@ -170,14 +170,14 @@ impl<'a, E: Experiment> Job<'a, E> {
             .as_ref()
             .is_some_and(|stored| stored.status == Status::Complete);
         let images = settings.images.open(settings.access)?;
-        let mut enhancers = OpenEnhancers::deferred(files, &settings.loading);
+        let mut enhancers = EnhancerModels::from_files(files, &settings.loading);
         if !complete {
             // Loaded before the folder is created, so that a broken enhancer leaves no folder. Enhancers with stored findings were loaded
             // by an earlier run, and are not loaded here.
             enhancers.open_runtime()?;
             let maker = Maker::new(enhancers.version(), &settings.loading.size);
             let are_all_known = match &images {
-                Some(store) => StoredFindings::new(store, &maker).know_all(&enhancers)?,
+                Some(store) => StoredFindings::new(store, &maker).has_all(&enhancers)?,
                 None => false,
             };
             if !are_all_known {

@@ -50,7 +50,7 @@ impl<'a> KeyFacts<'a> {
             parameters: &model.digest,
             question,
             before: &prompt.before,
-            behind: prompt.behind.as_deref(),
+            behind: prompt.after.as_deref(),
             places: Some(prompt.places).filter(|places| *places != ImagePlaces::Together),
             choices: None,
             repeat: None,

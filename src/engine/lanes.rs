@@ -83,7 +83,7 @@ impl<'a, I> Lanes<'a, I> {
     /// Limits the requests in flight to the connections that this process may open in addition to the files of these threads. Prints a
     /// warning if that is fewer than the settings allow.
     pub(crate) fn keep_within_open_files(&mut self, threads: ThreadArgs) {
-        let Some(RequestLimit { limit, requests }) = RequestLimit::now(threads.number()) else {
+        let Some(RequestLimit { limit, requests }) = RequestLimit::now(threads.count()) else {
             return;
         };
         let addresses: usize = self.by_endpoint.iter().map(|lane| lane.addresses).sum();

@@ -17,7 +17,7 @@ use crate::engine::models::{self, ModelUnderTest};
 use crate::engine::settings::JobSettings;
 use crate::error::Result;
 use crate::image_store::ImageStore;
-use crate::images::enhancement::enhancers::OpenEnhancers;
+use crate::images::enhancement::enhancers::EnhancerModels;
 use crate::images::frames::Source;
 use crate::images::image_pipeline::ImagePipeline;
 use crate::images::image_steps::ImageSteps;
@@ -56,7 +56,7 @@ const UNTOUCHED_FIRST: usize = 128;
 pub(crate) struct OpenRun<'a, E: Experiment> {
     pub(crate) experiment: &'a E,
     pub(crate) progress: &'a Progress,
-    pub(crate) enhancers: OpenEnhancers<'a>,
+    pub(crate) enhancers: EnhancerModels<'a>,
     pub(crate) store: Store<DetailOf<E>>,
     /// True if notes about images were lost before this command.
     pub(crate) lacks_notes: bool,
@@ -185,7 +185,7 @@ impl<E: Experiment> OpenRun<'_, E> {
         }
         let again = truncated(&stored, self.experiment.models(phase));
         plan.exclude(|key| answered.contains(key) && !again.contains(key));
-        let asked_again = plan.remaining_of(|key| again.contains(key));
+        let asked_again = plan.remaining_where(|key| again.contains(key));
         if asked_again > 0 {
             let replies = plural(asked_again, "truncated reply is", "truncated replies are");
             let flag = self.experiment.token_flag(phase);
@@ -309,7 +309,7 @@ impl<E: Experiment> OpenRun<'_, E> {
         let images = self.images.as_ref();
         let mut pipeline = pipeline(experiment, Vec::new(), limit, &timings);
         pipeline.steps.stored = images.map(|images| StoredImages::new(images, &maker));
-        workers.all.install(|| {
+        workers.shared.install(|| {
             if shows_images {
                 dark_already::warn(experiment);
             }
@@ -317,7 +317,7 @@ impl<E: Experiment> OpenRun<'_, E> {
             pipeline.check(sources, &plan.sources)
         })?;
         let usages = pipeline.usages();
-        pipeline.open_sets(sources, &plan.sources, &workers)?;
+        pipeline.open_enhancer_sets(sources, &plan.sources, &workers)?;
         if self.images.is_some() {
             let names = models.iter().map(|model| model.name.as_ref());
             let first = first_source(names, settings.shard, plan.sources.len());
@@ -346,7 +346,7 @@ impl<E: Experiment> OpenRun<'_, E> {
         })?;
         self.note_enhancers(usages);
         if settings.show_timings {
-            let threads = workers.each.len();
+            let threads = workers.single_threaded.len();
             let line = timings.summary(started.elapsed(), threads);
             let line = match E::PHASES {
                 [_] => line,
@@ -386,7 +386,7 @@ impl<E: Experiment> OpenRun<'_, E> {
         self.manifest.platform.extend(self.enhancers.version());
         self.write_counts(stored)?;
         if answered > 0 {
-            self.progress.say(&format!(
+            self.progress.print_on_terminal(&format!(
                 "{}: {answered} of {trials} trials already answered",
                 self.store.folder().display()
             ));

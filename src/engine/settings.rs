@@ -199,7 +199,7 @@ impl JobSettings {
     /// of an existing run is exempt, because that run may not need the runtime any more.
     pub(crate) fn enhancers(&self) -> Result<Vec<ModelFile>> {
         check_used(&self.light, &self.enhancers)?;
-        let files = enhancers::read(&self.enhancers.llie)?;
+        let files = enhancers::read_models(&self.enhancers.llie)?;
         let exists = match &self.place {
             RunPlace::Automatic => false,
             RunPlace::Named(path) | RunPlace::Resume(path) => path.exists(),

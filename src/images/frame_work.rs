@@ -1,4 +1,4 @@
-//! The steps from one frame to its images: [`FrameWork`].
+//! Cached steps from one frame to its images: [`FrameWork`].
 
 pub(crate) mod pairs;
 pub(crate) mod staged;
@@ -21,14 +21,14 @@ use crate::types::{
 };
 use darkqa_light::{AppliedDegradation, Exposures, FrameView, NoiseKey};
 
-/// Cached steps of one frame. Each is computed once, when it is first needed.
+/// Cached steps of one frame (file, clean pixels, degraded image). Each is computed on first use.
 pub(crate) struct FrameWork<'a> {
     pub(crate) steps: ImageSteps<'a>,
     frame: FrameId,
     key: NoiseKey,
     /// Digest of the file when the plan was made; `None` if any file is accepted.
-    planned: Option<Digest>,
-    /// Name of the source, and the frame, for the store; `None` without a store or a plan.
+    planned_digest: Option<Digest>,
+    /// Name of the source and its frame, for the store keys; `None` without a store or a plan.
     origin: Option<Box<(FrameId, SourceFrame)>>,
     /// Width and height of the file, in pixels.
     size: Option<(u32, u32)>,
@@ -42,37 +42,43 @@ pub(crate) struct FrameWork<'a> {
     degraded: Option<(Degradation, Arc<Rgb>)>,
     /// Photographs of the scene in the dark.
     photographs: Vec<SourcePhotograph>,
-    /// Work on these photographs, by name.
-    dark: BTreeMap<PhotoName, Box<Self>>,
-    /// The frame and the photograph of it that this is work on; `None` for work on the frame itself.
+    /// Cached steps of these photographs, by name.
+    photograph_works: BTreeMap<PhotoName, Box<Self>>,
+    /// If these are the steps of a photograph: the name of its frame and its own; else `None`.
     photograph: Option<(FrameId, PhotoName)>,
 }
 
 impl<'a> FrameWork<'a> {
-    /// Work on a frame of a planned source. Its file is read when it is needed, and must still have the same digest.
-    pub(crate) fn planned(steps: ImageSteps<'a>, source: &Source, frame: &SourceFrame) -> Self {
-        let key = steps.recipe.noise(&source.name, &frame.id);
-        let origin = || Box::new((source.name.clone(), frame.clone()));
+    /// The steps of a frame of a planned source. The file is read on first use, and must still have the same digest.
+    pub(crate) fn for_source(steps: ImageSteps<'a>, source: &Source, frame: &SourceFrame) -> Self {
+        let key = steps.recipe.noise_key(&source.name, &frame.id);
         Self {
-            origin: steps.stored.map(|_| origin()),
+            origin: steps
+                .stored
+                .map(|_| Box::new((source.name.clone(), frame.clone()))),
             size: Some(frame.size),
             photographs: frame.photographs.clone(),
             ..Self::new(steps, frame.id.clone(), key, Some(frame.digest))
         }
     }
 
-    /// Work on a frame alone, without a check of its digest.
-    pub(crate) fn alone(steps: ImageSteps<'a>, frame: FrameId) -> Self {
+    /// The steps of a frame without a plan; the digest of its file is not checked.
+    pub(crate) fn for_frame(steps: ImageSteps<'a>, frame: FrameId) -> Self {
         let key = NoiseKey::new(steps.recipe.seed, &frame);
         Self::new(steps, frame, key, None)
     }
 
-    fn new(steps: ImageSteps<'a>, frame: FrameId, key: NoiseKey, planned: Option<Digest>) -> Self {
+    fn new(
+        steps: ImageSteps<'a>,
+        frame: FrameId,
+        key: NoiseKey,
+        planned_digest: Option<Digest>,
+    ) -> Self {
         Self {
             steps,
             frame,
             key,
-            planned,
+            planned_digest,
             origin: None,
             size: None,
             picture: None,
@@ -82,12 +88,12 @@ impl<'a> FrameWork<'a> {
             exposures: Exposures::default(),
             degraded: None,
             photographs: Vec::new(),
-            dark: BTreeMap::new(),
+            photograph_works: BTreeMap::new(),
             photograph: None,
         }
     }
 
-    /// Width and height of the file, in pixels; `None` before it is read, if it was not planned.
+    /// Width and height of the file, in pixels; `None` for an unplanned frame that was not read yet.
     pub(crate) fn size(&self) -> Option<[u32; 2]> {
         self.size.map(|(width, height)| [width, height])
     }
@@ -97,25 +103,25 @@ impl<'a> FrameWork<'a> {
         &self.frame
     }
 
-    /// The place of the frame in a condition in the store; `None` without a store, and for photographs in the dark.
+    /// The place in the store of this frame in a condition; `None` without a store, and for photographs in the dark.
     ///
     /// # Errors
-    /// If the condition cannot be made of this frame.
+    /// If the frame cannot be shown in the condition.
     pub(crate) fn stored_place(&self, condition: &Condition) -> Result<Option<StoredPlace<'a>>> {
         let (Some(stored), Some(origin)) = (self.steps.stored, &self.origin) else {
             return Ok(None);
         };
         let (source, frame) = &**origin;
-        let place = stored.place(self.steps.recipe, (source, frame), condition)?;
+        let place = stored.place(self.steps.recipe, source, frame, condition)?;
         Ok(Some(place))
     }
 
-    /// How the file of the frame is read.
+    /// Changes that reading the file makes besides decoding it.
     pub(crate) fn note(&mut self) -> Result<InputNote> {
         self.picture().map(Picture::note)
     }
 
-    /// The file itself, if it is a plain PNG that can be sent as it is; else `None`.
+    /// The file of the frame, if it is a plain PNG that can be sent unchanged; else `None`.
     pub(crate) fn unchanged_file(&mut self, condition: &Condition) -> Result<Option<Arc<Payload>>> {
         let Recipe {
             format, scaling, ..
@@ -129,27 +135,28 @@ impl<'a> FrameWork<'a> {
         let Picture::Encoded(file) = self.picture()? else {
             return Ok(None);
         };
-        let payload = Payload::from_plain_png(file.bytes());
-        payload
+        Payload::from_plain_png(file.bytes())
             .filter(|payload| {
                 let (width, height) = payload.size();
-                scaling.size((width as u32, height as u32)) == payload.size()
+                scaling.size(width as u32, height as u32) == payload.size()
             })
-            .map(|payload| self.steps.checked(payload))
+            .map(|payload| self.steps.check_size(payload))
             .transpose()
     }
 
-    /// The frame's file; an error if its digest is not that of the plan.
+    /// The file of the frame, not decoded.
+    ///
+    /// # Errors
+    /// If it cannot be read, or its digest is not that of the plan.
     pub(crate) fn picture(&mut self) -> Result<&Picture> {
-        let (steps, frame, planned) = (self.steps, &self.frame, self.planned);
+        let (steps, frame, planned_digest) = (self.steps, &self.frame, self.planned_digest);
         let photograph = self.photograph.as_ref();
-        once(&mut self.picture, || {
-            let read = || match photograph {
+        get_or_try_insert(&mut self.picture, || {
+            let picture = steps.timings.time(TimedStep::Decode, || match photograph {
                 None => steps.frames.picture(frame),
                 Some((of, name)) => steps.frames.photograph(of, name),
-            };
-            let picture = steps.timings.time(TimedStep::Decode, read)?;
-            if planned.is_none_or(|planned| planned == picture.digest()) {
+            })?;
+            if planned_digest.is_none_or(|planned| planned == picture.digest()) {
                 return Ok(picture);
             }
             let problem = "the image was changed during the run; restore it, or begin a new run";
@@ -157,10 +164,10 @@ impl<'a> FrameWork<'a> {
         })
     }
 
-    /// The pixels of the clean frame in the depth of its file: in its own size, or scaled if its light is reduced after scaling.
+    /// The pixels of the clean frame in the bit depth of its file. They are scaled already if frames are degraded after scaling.
     ///
     /// # Errors
-    /// If the file is broken, or a frame of more than 8 bits is to be scaled before its light is reduced.
+    /// If the file is broken, or a frame of more than 8 bits would be degraded after scaling.
     pub(crate) fn pixels(&mut self) -> Result<&Pixels> {
         if self.pixels.is_none() {
             let ImageSteps {
@@ -170,23 +177,23 @@ impl<'a> FrameWork<'a> {
             let pixels = timings.time(TimedStep::Decode, || picture.pixels())?;
             let pixels = match (recipe.degraded_at, recipe.scaling) {
                 (DegradeStage::Resized, Scaling::LongerSide(side)) => {
-                    resized(pixels, side).map_err(|problem| Error::data(&self.frame, problem))?
+                    resize(pixels, side).map_err(|problem| Error::data(&self.frame, problem))?
                 }
                 _ => pixels,
             };
             self.pixels = Some(pixels);
         }
-        once(&mut self.pixels, || {
+        get_or_try_insert(&mut self.pixels, || {
             Err(Error::data(&self.frame, "the frame was not read"))
         })
     }
 
-    /// The clean frame as 8-bit codes, of the size of [`Self::pixels`].
+    /// The clean frame as 8-bit codes, in the size of [`Self::pixels`].
     pub(crate) fn clean(&mut self) -> Result<&Arc<Rgb>> {
         if self.clean.is_none() {
             self.clean = Some(self.pixels()?.codes());
         }
-        once(&mut self.clean, || {
+        get_or_try_insert(&mut self.clean, || {
             Err(Error::data(&self.frame, "the frame was not read"))
         })
     }
@@ -201,27 +208,30 @@ impl<'a> FrameWork<'a> {
         Ok(Arc::clone(self.clean_as_sent.insert(scaled)))
     }
 
-    /// Applies a degradation to this frame.
-    pub(crate) fn applied(&mut self, how: &Degradation) -> Result<AppliedDegradation> {
+    /// The parameters of a degradation for this frame.
+    pub(crate) fn apply(&mut self, how: &Degradation) -> Result<AppliedDegradation> {
         let recipe = self.steps.recipe;
         let view = if how.kind().has_motion() {
             self.view()?
         } else {
             FrameView::default()
         };
-        let applied = recipe.kinds.apply(how, view, &self.key);
-        applied.map_err(|e| Error::data(format_args!("{} at {how}", self.frame), e))
+        recipe
+            .kinds
+            .apply(how, view, &self.key)
+            .map_err(|e| Error::data(format_args!("{} at {how}", self.frame), e))
     }
 
     /// The camera's exposure in a condition; `None` for a kind that leaves it open.
     pub(crate) fn exposure(&mut self, condition: &Condition) -> Result<Option<ExposureFacts>> {
-        let how = condition.degradation();
-        let how = how.filter(|how| how.kind().has_motion());
-        let applied = how.map(|how| self.applied(how)).transpose()?;
+        let how = condition
+            .degradation()
+            .filter(|how| how.kind().has_motion());
+        let applied = how.map(|how| self.apply(how)).transpose()?;
         Ok(applied.and_then(|applied| applied.exposure()))
     }
 
-    /// The clean frame as the camera saw it.
+    /// Width and focal length of the frame as the camera saw it.
     fn view(&mut self) -> Result<FrameView> {
         let steps = self.steps;
         let size = match self.size {
@@ -232,18 +242,18 @@ impl<'a> FrameWork<'a> {
         Ok(steps.recipe.view(size, steps.frames.focal(&self.frame)))
     }
 
-    /// Whether the file was decoded.
+    /// True if the file was decoded.
     #[cfg(test)]
     pub(crate) fn is_decoded(&self) -> bool {
         self.pixels.is_some()
     }
 
-    /// The frame in one degradation, or clean. The last one is cached for the enhancers that follow.
+    /// The degraded frame, or the clean one without a degradation. The last degraded frame is cached, because several enhancers use it.
     pub(crate) fn degraded(&mut self, how: Option<&Degradation>) -> Result<&Arc<Rgb>> {
         let Some(how) = how else {
             return self.clean();
         };
-        let applied = self.applied(how)?;
+        let applied = self.apply(how)?;
         self.pixels()?;
         let Self {
             steps,
@@ -257,19 +267,21 @@ impl<'a> FrameWork<'a> {
         if degraded.as_ref().is_some_and(|(cached, _)| cached != how) {
             *degraded = None;
         }
-        let (_, image) = once(degraded, || {
-            let pixels = pixels.as_ref();
-            let pixels = pixels.ok_or_else(|| Error::data(&*frame, "the frame was not read"))?;
-            let degrade = || exposures.degrade(pixels.into(), &applied, key);
-            let image = steps.timings.time(TimedStep::Degrade, degrade);
+        let (_, image) = get_or_try_insert(degraded, || {
+            let pixels = pixels
+                .as_ref()
+                .ok_or_else(|| Error::data(&*frame, "the frame was not read"))?;
+            let image = steps.timings.time(TimedStep::Degrade, || {
+                exposures.degrade(pixels.into(), &applied, key)
+            });
             Ok((how.clone(), Arc::new(image)))
         })?;
         Ok(image)
     }
 }
 
-/// A frame with this longer side.
-fn resized(pixels: Pixels, side: usize) -> Result<Pixels, String> {
+/// Scales a frame of 8 bits to a longer side of `side` pixels.
+fn resize(pixels: Pixels, side: usize) -> Result<Pixels, String> {
     if pixels.height().max(pixels.width()) == side {
         return Ok(pixels);
     }
@@ -281,8 +293,8 @@ fn resized(pixels: Pixels, side: usize) -> Result<Pixels, String> {
     Ok(Pixels::Codes8(Arc::new(resized)))
 }
 
-/// The value in a slot; computed first if the slot is empty.
-fn once<T>(slot: &mut Option<T>, compute: impl FnOnce() -> Result<T>) -> Result<&T> {
+/// The value in a slot, which is computed first if the slot is empty.
+fn get_or_try_insert<T>(slot: &mut Option<T>, compute: impl FnOnce() -> Result<T>) -> Result<&T> {
     let value = match slot.take() {
         Some(value) => value,
         None => compute()?,

@@ -1,9 +1,9 @@
-//! The pipeline from a frame to images: degrade → enhance → scale → encode ([`ImagePipeline`]), for everything asked or written.
+//! The pipeline from a frame to images: degrade → enhance → scale → encode ([`ImagePipeline`]).
 //!
-//! The images of a frame are made condition by condition, those of a walk all at once. The channel is bounded. So memory holds only the
-//! images in flight, one or two more groups, and the frame of each worker.
+//! The images of a frame are made condition by condition, those of a walk all at once. The channel to the requests is bounded, so that
+//! memory contains only the images in flight, one or two more groups, and the frame of each worker.
 
-mod noted;
+mod image_and_notes;
 mod opening;
 mod preparation;
 
@@ -17,15 +17,15 @@ use rayon::prelude::*;
 use tokio::sync::mpsc::Sender;
 
 use crate::error::{Error, Result};
-use crate::images::enhancement::RestingEnhancer;
+use crate::images::enhancement::LazyEnhancer;
 use crate::images::frame_work::FrameWork;
 use crate::images::frame_work::pairs::Resolved;
-use crate::images::frame_work::staged::{MadeImage, StagedImage};
+use crate::images::frame_work::staged::{PreparedImage, StagedImage};
 use crate::images::frames::Source;
 use crate::images::image_steps::ImageSteps;
 use crate::images::notes::thumbnail::{ShownObjects, thumbnail_of_all};
 use crate::images::notes::{ImageNotes, MissingNotes};
-use crate::images::stored::{MadeNotes, Needed};
+use crate::images::stored::{Needed, StoredNotes};
 use crate::images::timings::TimedStep;
 use crate::images::trials::{Item, PreparedGroup, SourcePlan, Stimulus, TrialGroup};
 use crate::images::workers::Workers;
@@ -36,30 +36,30 @@ use darkqa_enhance::{Enhancer, ImageUse, Implausible};
 /// The steps from a frame to an image, with the enhancement models that they need.
 pub(crate) struct ImagePipeline<'a> {
     pub(crate) steps: ImageSteps<'a>,
-    /// Enhancers that are open.
+    /// Open enhancers.
     pub(crate) enhancers: Vec<Enhancer>,
-    /// Enhancers whose images are all in the store.
-    resting: Vec<Arc<RestingEnhancer>>,
-    /// Further sets of the enhancers, each for a worker of its own; empty if one image is enhanced at a time.
-    sets: Vec<Vec<Enhancer>>,
-    /// The treatment of an enhancer whose output cannot be an enhanced image.
+    /// Enhancers that are opened only if an image is missing in the store.
+    lazy: Vec<Arc<LazyEnhancer>>,
+    /// One set of enhancers per worker; empty if one image is enhanced at a time.
+    enhancer_sets: Vec<Vec<Enhancer>>,
+    /// Reaction to implausible output of an enhancer: stop or continue.
     implausible: Implausible,
-    /// In a shard, the frames of the whole run that enhancers are tried on; empty for those of the plan.
+    /// In a shard: the frames of the whole run on which enhancers are probed. Empty: the frames of the plan are used.
     pub(crate) whole_run: &'a [Source],
 }
 
 /// A source in progress.
 enum SourceWork<'a> {
-    /// One frame, whose images are made when they are needed.
+    /// One frame; each image is made on demand.
     Frame(Box<FrameWork<'a>>),
-    /// A walk, or several frames of one question, whose images are all made, by condition.
+    /// A walk, or several frames of one question: all images, by condition.
     Walk(BTreeMap<Condition, Vec<Arc<Payload>>>),
-    /// A source whose images cannot be made, and the reason.
+    /// The reason why the images of a source cannot be made.
     Failed(Error),
 }
 
 impl<'a> ImagePipeline<'a> {
-    /// A pipeline with enhancers that are open.
+    /// A pipeline with open enhancers.
     pub(crate) fn new(
         steps: ImageSteps<'a>,
         enhancers: Vec<Enhancer>,
@@ -68,8 +68,8 @@ impl<'a> ImagePipeline<'a> {
         Self {
             steps,
             enhancers,
-            resting: Vec::new(),
-            sets: Vec::new(),
+            lazy: Vec::new(),
+            enhancer_sets: Vec::new(),
             implausible,
             whole_run: &[],
         }
@@ -77,8 +77,8 @@ impl<'a> ImagePipeline<'a> {
 
     /// Makes the images of all sources, until they are done or the channel is closed.
     ///
-    /// Normally each worker has one thread and works on one frame at a time, with a set of enhancers of its own. All workers share one
-    /// source in three cases: with enhancers that are open only once and have their own threads; with walks; and with few frames.
+    /// Normally each worker has one thread, its own frame and its own set of enhancers. All workers share one source in three cases:
+    /// if the enhancers are open only once (they have their own threads), for walks, and if there are few frames.
     pub(crate) fn develop<I: Item>(
         mut self,
         sources: &[Source],
@@ -87,31 +87,36 @@ impl<'a> ImagePipeline<'a> {
         workers: &Workers,
         groups: &Sender<PreparedGroup<I>>,
     ) {
-        if !self.enhancers.is_empty() || !one_frame_each(sources, &plan, workers.each.len()) {
+        if !self.enhancers.is_empty()
+            || !has_frames_for_all_workers(sources, &plan, workers.single_threaded.len())
+        {
             return workers
-                .all
+                .shared
                 .install(|| self.send_groups(sources, plan.into_iter(), missing, groups));
         }
         let steps = self.steps;
         let plan = Mutex::new(plan.into_iter());
-        let next = || plan.lock().unwrap_or_else(PoisonError::into_inner).next();
-        let sets = match self.sets.len() {
-            0 => workers.each.iter().map(|_| Vec::new()).collect(),
-            _ => self.sets,
+        let sets = match self.enhancer_sets.len() {
+            0 => workers.single_threaded.iter().map(|_| Vec::new()).collect(),
+            _ => self.enhancer_sets,
         };
+        let plan = &plan;
         std::thread::scope(|scope| {
-            for (worker, enhancers) in workers.each.iter().zip(sets) {
+            for (worker, enhancers) in workers.single_threaded.iter().zip(sets) {
                 let mut pipeline = ImagePipeline {
                     steps,
                     enhancers,
-                    resting: self.resting.clone(),
-                    sets: Vec::new(),
+                    lazy: self.lazy.clone(),
+                    enhancer_sets: Vec::new(),
                     implausible: self.implausible,
                     whole_run: self.whole_run,
                 };
                 scope.spawn(move || {
                     worker.install(|| {
-                        pipeline.send_groups(sources, std::iter::from_fn(next), missing, groups);
+                        let next_part = std::iter::from_fn(|| {
+                            plan.lock().unwrap_or_else(PoisonError::into_inner).next()
+                        });
+                        pipeline.send_groups(sources, next_part, missing, groups);
                     });
                 });
             }
@@ -128,9 +133,8 @@ impl<'a> ImagePipeline<'a> {
         let timings = self.steps.timings;
         // The error means that the channel is closed.
         let _ = self.for_each_group(sources, plan, missing, |group| {
-            let send = || groups.blocking_send(group).is_ok();
             timings
-                .time(TimedStep::Waiting, send)
+                .time(TimedStep::Waiting, || groups.blocking_send(group).is_ok())
                 .then_some(())
                 .ok_or(())
         });
@@ -150,9 +154,9 @@ impl<'a> ImagePipeline<'a> {
         for part in plan {
             let source = &sources[part.source];
             let conditions: Vec<&Condition> = part.conditions().collect();
-            let mut work = self.begin(source, &conditions);
+            let mut work = self.start_source(source, &conditions);
             for TrialGroup { condition, trials } in part.groups {
-                let result = self.group(&mut work, condition.as_ref(), source, missing);
+                let result = self.make_group(&mut work, condition.as_ref(), source, missing);
                 let (images, notes, problem) = match result {
                     Ok((images, notes)) => (images, notes, None),
                     Err(problem) => (Vec::new(), ImageNotes::default(), Some(problem)),
@@ -168,11 +172,11 @@ impl<'a> ImagePipeline<'a> {
         Ok(())
     }
 
-    fn begin(&mut self, source: &Source, conditions: &[&Condition]) -> SourceWork<'a> {
+    fn start_source(&mut self, source: &Source, conditions: &[&Condition]) -> SourceWork<'a> {
         match &source.frames[..] {
             // A walk may show its only frame several times.
             [frame] if source.order.len() == 1 => {
-                SourceWork::Frame(Box::new(FrameWork::planned(self.steps, source, frame)))
+                SourceWork::Frame(Box::new(FrameWork::for_source(self.steps, source, frame)))
             }
             _ if conditions.is_empty() => SourceWork::Walk(BTreeMap::new()),
             _ => match self.images(source, conditions) {
@@ -185,9 +189,9 @@ impl<'a> ImagePipeline<'a> {
         }
     }
 
-    /// The images of a group in the order shown, with the missing notes; none if nothing is shown. Of several images, one
-    /// thumbnail stands for all, and no fidelity is measured.
-    fn group(
+    /// Makes the images of a group in the order shown, with the missing notes; none without a condition. Several images share one
+    /// thumbnail, and their fidelity is not measured.
+    fn make_group(
         &mut self,
         work: &mut SourceWork<'_>,
         condition: Option<&Condition>,
@@ -205,8 +209,7 @@ impl<'a> ImagePipeline<'a> {
                     size,
                     objects: missing.objects(name),
                 });
-                let (image, notes) =
-                    self.image_and_notes(work, condition, (name, shown), wanted)?;
+                let (image, notes) = self.image_and_notes(work, condition, name, shown, wanted)?;
                 Ok((vec![image], notes))
             }
             SourceWork::Walk(images) => {
@@ -214,11 +217,10 @@ impl<'a> ImagePipeline<'a> {
                 let thumbnail = wanted
                     .thumbnail
                     .then(|| thumbnail_of_all(name, condition, &images))
-                    .and_then(|made| or_warning(name, condition, made).flatten());
-                let fidelity = None;
+                    .and_then(|made| ok_or_warn(name, condition, made).flatten());
                 let notes = ImageNotes {
                     thumbnail,
-                    fidelity,
+                    fidelity: None,
                 };
                 Ok((images, notes))
             }
@@ -230,7 +232,7 @@ impl<'a> ImagePipeline<'a> {
         }
     }
 
-    /// The images of a source in each of these conditions, in the order shown.
+    /// Makes the images of a source: one list per condition, in the order shown.
     ///
     /// # Errors
     /// If the source cannot be shown, or one of its images cannot be made.
@@ -244,12 +246,12 @@ impl<'a> ImagePipeline<'a> {
         }
         let mut images = vec![Vec::with_capacity(source.frames.len()); conditions.len()];
         let steps = self.steps;
-        // One frame per thread at a time, because each holds a frame in its full size.
+        // One frame per thread at a time, because a frame in full size takes much memory.
         for frames in source.frames.chunks(rayon::current_num_threads()) {
             let staged = frames
                 .par_iter()
                 .map(|frame| {
-                    let mut work = FrameWork::planned(steps, source, frame);
+                    let mut work = FrameWork::for_source(steps, source, frame);
                     let mut staged = Vec::with_capacity(conditions.len());
                     for condition in conditions {
                         staged.push(work.stage(condition, Needed::Image)?);
@@ -260,32 +262,34 @@ impl<'a> ImagePipeline<'a> {
             for (frame, staged) in frames.iter().zip(staged) {
                 let conditions = conditions.iter().zip(&mut images);
                 for (staged, (condition, images)) in staged.into_iter().zip(conditions) {
-                    images.push(self.finished(staged, &frame.id, condition)?.payload);
+                    images.push(self.finish(staged, &frame.id, condition)?.payload);
                 }
             }
         }
-        let in_order = |images: Vec<Arc<Payload>>| {
-            source
-                .order
-                .iter()
-                .map(|place| Arc::clone(&images[*place]))
-                .collect()
-        };
-        Ok(images.into_iter().map(in_order).collect())
+        Ok(images
+            .into_iter()
+            .map(|images| {
+                source
+                    .order
+                    .iter()
+                    .map(|index| Arc::clone(&images[*index]))
+                    .collect()
+            })
+            .collect())
     }
 
-    /// A frame in a condition as it is sent, with what is needed besides.
+    /// Makes the image of a frame in a condition as it is sent, with the facts that are needed.
     pub(crate) fn image<'w>(
         &mut self,
         work: &mut FrameWork<'w>,
         condition: &Condition,
         needed: Needed,
-    ) -> Result<MadeImage<'w>> {
+    ) -> Result<PreparedImage<'w>> {
         let staged = work.stage(condition, needed)?;
-        self.finished(staged, work.frame(), condition)
+        self.finish(staged, work.frame(), condition)
     }
 
-    /// The pixels of a frame in a condition, in the size of the frame.
+    /// Makes the pixels of a frame in a condition, in the size of the frame.
     pub(crate) fn pixels(
         &mut self,
         work: &mut FrameWork<'_>,
@@ -293,24 +297,24 @@ impl<'a> ImagePipeline<'a> {
     ) -> Result<Arc<Rgb>> {
         let Resolved {
             work, condition, ..
-        } = work.resolved(condition)?;
+        } = work.resolve(condition)?;
         let degraded = Arc::clone(work.degraded(condition.degradation())?);
         match &condition.enhancer {
             None => Ok(degraded),
             Some(name) => {
-                let enhanced = self.enhanced(&degraded, name, (work.frame(), &condition))?;
+                let enhanced = self.enhance(&degraded, name, work.frame(), &condition)?;
                 Ok(Arc::new(enhanced.0))
             }
         }
     }
 
-    /// An image after its enhancer.
-    fn finished<'w>(
+    /// Applies the enhancer to a staged image that needs it.
+    fn finish<'w>(
         &mut self,
         staged: StagedImage<'w>,
         frame: &FrameId,
         condition: &Condition,
-    ) -> Result<MadeImage<'w>> {
+    ) -> Result<PreparedImage<'w>> {
         match staged {
             StagedImage::Ready(image) => Ok(image),
             StagedImage::Stored {
@@ -318,7 +322,7 @@ impl<'a> ImagePipeline<'a> {
                 enhancer,
                 notes,
             } => {
-                self.note_stored(&notes, &enhancer, [frame, condition])?;
+                self.note_stored_image(&notes, &enhancer, [frame, condition])?;
                 Ok(image)
             }
             StagedImage::ToEnhance {
@@ -327,17 +331,17 @@ impl<'a> ImagePipeline<'a> {
                 mut finish,
             } => {
                 let started = Instant::now();
-                let (image, used) = self.enhanced(&degraded, &enhancer, (frame, condition))?;
+                let (image, used) = self.enhance(&degraded, &enhancer, frame, condition)?;
                 finish.took += started.elapsed();
                 finish.image(&Arc::new(image), Some(used))
             }
         }
     }
 
-    /// Notes an image of the store as its enhancer would.
-    fn note_stored(
+    /// Adds a stored image to the usage of its enhancer, as if it had been enhanced now.
+    fn note_stored_image(
         &mut self,
-        notes: &MadeNotes,
+        notes: &StoredNotes,
         name: &EnhancerName,
         place: [&dyn ToString; 2],
     ) -> Result<()> {
@@ -345,39 +349,43 @@ impl<'a> ImagePipeline<'a> {
         let Some(used) = &notes.enhanced else {
             return Ok(());
         };
-        if let Some(images) = self.steps.recipe.elsewhere(name) {
+        if let Some(images) = self.steps.recipe.enhanced_images(name) {
             return used.note_made_elsewhere(images.usage(), images.folder(), place, implausible);
         }
-        match self.resting(name) {
-            Some(resting) => used.note_in(resting.usage(), resting.path(), place, implausible),
+        match self.lazy_enhancer(name) {
+            Some(lazy) => used.note_in(lazy.usage(), lazy.path(), place, implausible),
             None => self.enhancer(name)?.note_stored(used, place, implausible),
         }
     }
 
-    /// The enhanced image of a frame in a condition, which are named where the image cannot be an enhanced one.
-    fn enhanced(
+    /// Enhances the image of a frame in a condition. Both names appear in the message about an implausible result.
+    fn enhance(
         &mut self,
         image: &Rgb,
         name: &EnhancerName,
-        (frame, condition): (&FrameId, &Condition),
+        frame: &FrameId,
+        condition: &Condition,
     ) -> Result<(Rgb, ImageUse)> {
         let (timings, implausible) = (self.steps.timings, self.implausible);
-        if let Some(images) = self.steps.recipe.elsewhere(name) {
-            let read = || images.image(image, (frame, condition), implausible);
-            return timings.time(TimedStep::Decode, read);
+        if let Some(images) = self.steps.recipe.enhanced_images(name) {
+            return timings.time(TimedStep::Decode, || {
+                images.image(image, frame, condition, implausible)
+            });
         }
         let place: [&dyn ToString; 2] = [frame, condition];
-        if let Some(resting) = self.resting(name) {
-            let enhance = || resting.enhance_noted(image, place, implausible);
-            return timings.time(TimedStep::Enhance, enhance);
+        if let Some(lazy) = self.lazy_enhancer(name) {
+            return timings.time(TimedStep::Enhance, || {
+                lazy.enhance_noted(image, place, implausible)
+            });
         }
         let enhancer = self.enhancer(name)?;
-        let enhance = || enhancer.enhance_noted(image, place, implausible);
-        timings.time(TimedStep::Enhance, enhance)
+        timings.time(TimedStep::Enhance, || {
+            enhancer.enhance_noted(image, place, implausible)
+        })
     }
 
-    fn resting(&self, name: &EnhancerName) -> Option<&RestingEnhancer> {
-        self.resting
+    fn lazy_enhancer(&self, name: &EnhancerName) -> Option<&LazyEnhancer> {
+        self.lazy
             .iter()
             .map(Arc::as_ref)
             .find(|enhancer| enhancer.name() == name)
@@ -391,14 +399,20 @@ impl<'a> ImagePipeline<'a> {
     }
 }
 
-/// Whether each worker can work on frames of its own: there are enough of them, and no walks.
-fn one_frame_each<I>(sources: &[Source], plan: &[SourcePlan<I>], workers: usize) -> bool {
-    let mut parts = plan.iter();
-    plan.len() >= 2 * workers && parts.all(|part| sources[part.source].frames.len() < 2)
+/// True if there are at least two frames per worker, and no walks.
+fn has_frames_for_all_workers<I>(
+    sources: &[Source],
+    plan: &[SourcePlan<I>],
+    workers: usize,
+) -> bool {
+    plan.len() >= 2 * workers
+        && plan
+            .iter()
+            .all(|part| sources[part.source].frames.len() < 2)
 }
 
-/// The value made for the report, or a warning and `None`: an answer must not fail because of a picture for the report.
-fn or_warning<T>(name: &FrameId, condition: &Condition, made: Result<T>) -> Option<T> {
+/// Returns the thumbnail; if it could not be made, warns and returns `None`, so that a trial never fails because of the report.
+fn ok_or_warn<T>(name: &FrameId, condition: &Condition, made: Result<T>) -> Option<T> {
     made.inspect_err(|problem| {
         tracing::warn!("the report has no thumbnail of {name} at {condition}: {problem}");
     })

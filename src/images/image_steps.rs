@@ -1,4 +1,4 @@
-//! Files, settings and timings that all images share: [`ImageSteps`].
+//! Settings and steps that all images share: [`ImageSteps`].
 
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -9,18 +9,18 @@ use crate::error::Result;
 use crate::images::frames::Frames;
 use crate::images::recipes::Recipe;
 use crate::images::stored::{
-    MadeNotes, Needed, Similarity, StoredImage, StoredImages, StoredPlace,
+    Needed, Similarity, StoredImage, StoredImages, StoredNotes, StoredPlace,
 };
 use crate::images::timings::{TimedStep, Timings};
 use crate::picture::Payload;
 use crate::types::{ExposureFacts, InputNote, Rgb};
 
-/// Files, settings and timings that all images share.
+/// Frame files, recipe, endpoint limit, timings and image store that all images share.
 #[derive(Clone, Copy)]
 pub(crate) struct ImageSteps<'a> {
     pub(crate) frames: &'a dyn Frames,
     pub(crate) recipe: &'a Recipe,
-    /// Largest image that the endpoint takes; `None` if all models are built in.
+    /// Largest image that the endpoint accepts; `None` if all models are built in.
     pub(crate) limit: Option<ImageLimit>,
     pub(crate) timings: &'a Timings,
     /// The image store; `None` without one.
@@ -36,46 +36,45 @@ impl ImageSteps<'_> {
         }
     }
 
-    /// The image of a place in the store, if it is there with all that is needed.
+    /// Reads an image from the store; `None` if it or a needed fact is missing.
     pub(crate) fn stored_image(
         &self,
         place: &StoredPlace<'_>,
         needed: Needed,
     ) -> Option<StoredImage> {
-        let read = || place.read(self.recipe, needed);
-        self.timings.time(TimedStep::Decode, read)
+        self.timings
+            .time(TimedStep::Decode, || place.read(self.recipe, needed))
     }
 
-    /// How similar the image of a place is to its clean frame, if the store keeps that without the image.
-    pub(crate) fn stored_measures(&self, place: &StoredPlace<'_>) -> Option<Similarity> {
-        self.timings.time(TimedStep::Decode, || place.measures())
+    /// Similarity of an image to its clean frame, if the store has it without the image.
+    pub(crate) fn stored_similarity(&self, place: &StoredPlace<'_>) -> Option<Similarity> {
+        self.timings.time(TimedStep::Decode, || place.similarity())
     }
 
-    /// Adds an image that took this time to make to the store.
+    /// Adds an image to the store. `took` is the time that it took to make.
     pub(crate) fn store(
         &self,
         place: &StoredPlace<'_>,
         image: &Payload,
-        notes: &MadeNotes,
+        notes: &StoredNotes,
         took: Duration,
     ) {
-        let write = || place.write(image, notes, took);
-        self.timings.time(TimedStep::Encode, write);
+        self.timings
+            .time(TimedStep::Encode, || place.write(image, notes, took));
     }
 
-    /// An image from the store as it is sent, with what the camera did. `note` states how the file of its frame was read.
+    /// Adds the facts that the store does not keep to an image from it: how its frame was read (`note`), and the camera's exposure.
     pub(crate) fn stored_payload(
         &self,
         payload: Payload,
         note: &InputNote,
         exposure: Option<ExposureFacts>,
     ) -> Result<Arc<Payload>> {
-        let payload = payload.turned_by(note.orientation);
-        self.checked(payload.exposed_by(exposure))
+        let payload = payload.with_orientation(note.orientation);
+        self.check_size(payload.with_exposure(exposure))
     }
 
-    /// The image as it is sent, with what the camera did, and the pixels that were encoded. `note` states how the file of its frame was
-    /// read.
+    /// Scales and encodes an image; returns the payload and the scaled pixels. `note` tells how its frame was read.
     pub(crate) fn payload(
         &self,
         image: &Arc<Rgb>,
@@ -85,13 +84,13 @@ impl ImageSteps<'_> {
         let (payload, encoded) = self.timings.time(TimedStep::Encode, || {
             let encoded = self.scaled(image)?;
             let payload = Payload::encode(&encoded, self.recipe.format)?;
-            let payload = payload.turned_by(note.orientation);
-            Ok((payload.exposed_by(exposure), encoded))
+            let payload = payload.with_orientation(note.orientation);
+            Ok((payload.with_exposure(exposure), encoded))
         })?;
-        Ok((self.checked(payload)?, encoded))
+        Ok((self.check_size(payload)?, encoded))
     }
 
-    /// The image in the size sent; shared, not copied, if that is its own.
+    /// Scales an image to the size sent. An image that already has that size is shared, not copied.
     pub(crate) fn scaled(&self, image: &Arc<Rgb>) -> Result<Arc<Rgb>> {
         Ok(match self.recipe.scaling.scale(image)? {
             Cow::Borrowed(_) => Arc::clone(image),
@@ -99,7 +98,9 @@ impl ImageSteps<'_> {
         })
     }
 
-    pub(crate) fn checked(&self, payload: Payload) -> Result<Arc<Payload>> {
+    /// # Errors
+    /// If the image is larger than the endpoint accepts.
+    pub(crate) fn check_size(&self, payload: Payload) -> Result<Arc<Payload>> {
         if let Some(limit) = &self.limit {
             limit.check(payload.facts())?;
         }

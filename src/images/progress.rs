@@ -11,14 +11,14 @@ use tracing_subscriber::fmt::MakeWriter;
 use crate::report::forecast::{hours, money};
 use crate::types::text::shown;
 
-/// Progress on standard error: bars on a terminal, else a line a minute about the trials.
+/// Progress on standard error: bars on a terminal, otherwise one line a minute about the trials.
 #[derive(Debug, Clone)]
 pub(crate) struct Progress {
     bars: MultiProgress,
     form: ProgressForm,
 }
 
-/// The form of progress.
+/// How progress is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum ProgressForm {
     Bars,
@@ -26,15 +26,15 @@ enum ProgressForm {
     Nothing,
 }
 
-/// The time between two lines of progress.
+/// Time between two lines of progress.
 pub(crate) const LINE_INTERVAL: Duration = Duration::from_mins(1);
 
-/// Whether progress is shown.
+/// Whether progress is shown (`--quiet`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Verbosity {
-    /// Show progress.
+    /// Show progress; the default.
     Normal,
-    /// Show no progress (`--quiet`).
+    /// Show no progress.
     Quiet,
 }
 
@@ -57,19 +57,19 @@ impl Progress {
         }
     }
 
-    /// Prints one line above the bars, but nothing into a pipe or with `--quiet`.
-    pub(crate) fn say(&self, line: &str) {
+    /// Prints one line above the bars. Nothing is printed without bars: if standard error is not a terminal, or with `--quiet`.
+    pub(crate) fn print_on_terminal(&self, line: &str) {
         // A line that cannot be printed is no reason to stop.
         let _ = self.bars.println(line);
     }
 
-    /// Prints one line above the bars, also into a pipe and with `--quiet`.
+    /// Prints one line in all cases: above the bars, into a pipe, and with `--quiet`.
     pub(crate) fn note(&self, line: &str) {
         // A line that cannot be printed is no reason to stop.
         let _ = writeln!(self.make_writer(), "{line}");
     }
 
-    /// A plain bar for a step of known length, removed when it is dropped.
+    /// A plain bar for a step of known length.
     pub(crate) fn bar(&self, what: &'static str, length: usize) -> StepBar {
         let style = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len}");
         let bar = self
@@ -137,11 +137,11 @@ pub(crate) struct TrialProgress {
 }
 
 impl TrialProgress {
-    /// Shows the numbers of answered and failed trials, the US dollars spent, and a note about the pace.
+    /// Shows the numbers of answered and failed trials, the US dollars spent, and a note about the request rate.
     pub(crate) fn count(&self, answered: usize, failed: usize, spent: Option<f64>, pace: &str) {
         if let Some(lines) = &self.lines {
             let mut lines = lines.lock().unwrap_or_else(PoisonError::into_inner);
-            if let Some(line) = lines.next((answered, failed), spent, pace, Instant::now()) {
+            if let Some(line) = lines.next_line(answered, failed, spent, pace, Instant::now()) {
                 self.log.note(&line);
             }
         }
@@ -153,31 +153,32 @@ impl TrialProgress {
     }
 }
 
-/// Lines about the trials, one a minute.
+/// Source of the progress lines, at most one a minute.
 #[derive(Debug)]
 struct TrialLines {
     trials: usize,
-    /// Trials that were done at the start.
-    before: usize,
+    /// Trials that were answered before this call.
+    answered_before: usize,
     start: Instant,
-    /// The time of the last line; at first that of the start.
+    /// Time of the last line; initially the start.
     last: Instant,
 }
 
 impl TrialLines {
-    fn new(trials: usize, before: usize, start: Instant) -> Self {
+    fn new(trials: usize, answered_before: usize, start: Instant) -> Self {
         Self {
             trials,
-            before,
+            answered_before,
             start,
             last: start,
         }
     }
 
-    /// The line for these numbers of answered and failed trials, and for the US dollars spent; `None` within a minute after the last line.
-    fn next(
+    /// The line for these numbers of trials and US dollars; `None` within a minute after the last line.
+    fn next_line(
         &mut self,
-        (answered, failed): (usize, usize),
+        answered: usize,
+        failed: usize,
         spent: Option<f64>,
         pace: &str,
         now: Instant,
@@ -189,7 +190,7 @@ impl TrialLines {
         let done = answered + failed;
         let left = self.trials.saturating_sub(done);
         let seconds = now.duration_since(self.start).as_secs_f64();
-        let rate = done.saturating_sub(self.before) as f64 / seconds;
+        let rate = done.saturating_sub(self.answered_before) as f64 / seconds;
         let spent = spent.map_or(String::new(), |dollars| format!(" · {}", money(dollars)));
         let time = if rate > 0.0 {
             format!("{} left", hours(left as f64 / rate))
@@ -208,8 +209,7 @@ impl TrialLines {
 pub(crate) struct LogWriter(MultiProgress);
 
 impl Write for LogWriter {
-    /// Hidden characters are written out, because a line may quote a file. A terminal that was closed, or a reader that has gone, is
-    /// no reason to stop: what cannot be written is dropped.
+    /// Writes a line with hidden characters escaped, because it may quote a file. Errors of a closed terminal or pipe are ignored.
     fn write(&mut self, line: &[u8]) -> io::Result<usize> {
         let text = String::from_utf8_lossy(line);
         let shown = shown(&text);
@@ -238,22 +238,28 @@ mod tests {
     #[test]
     fn lines_come_once_a_minute() {
         let start = Instant::now();
-        let at = |seconds| start + Duration::from_secs(seconds);
         let mut lines = TrialLines::new(1000, 100, start);
-        assert_eq!(lines.next((110, 0), None, "", at(59)), None);
         assert_eq!(
-            lines.next((218, 2), Some(1.2), "", at(60)).as_deref(),
+            lines.next_line(110, 0, None, "", start + Duration::from_secs(59)),
+            None
+        );
+        assert_eq!(
+            lines
+                .next_line(218, 2, Some(1.2), "", start + LINE_INTERVAL)
+                .as_deref(),
             Some("218 of 1000 trials answered, 2 failed, 780 left · 2.0/s · $1.20 · 6 min left")
         );
-        assert_eq!(lines.next((230, 2), None, "", at(119)), None);
-        assert!(lines.next((230, 2), None, "", at(120)).is_some());
+        let second_line = start + 2 * LINE_INTERVAL;
+        let too_early = start + Duration::from_secs(119);
+        assert_eq!(lines.next_line(230, 2, None, "", too_early), None);
+        assert!(lines.next_line(230, 2, None, "", second_line).is_some());
     }
 
     #[test]
     fn without_a_reply_the_time_left_is_unknown() {
         let start = Instant::now();
         let mut lines = TrialLines::new(10, 4, start);
-        let line = lines.next((4, 0), None, "", start + LINE_INTERVAL);
+        let line = lines.next_line(4, 0, None, "", start + LINE_INTERVAL);
         assert_eq!(
             line.as_deref(),
             Some("4 of 10 trials answered, 0 failed, 6 left · 0.0/s · time left unknown")

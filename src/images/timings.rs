@@ -1,10 +1,10 @@
-//! The time that each step of a run takes: [`Timings`].
+//! Time of each step of a run: [`Timings`].
 
 use std::fmt;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-/// A step of the image pipeline, or a state in which requests wait.
+/// A step of the image pipeline, or a state of the request queue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum TimedStep {
     /// Reading and decoding of a file.
@@ -17,11 +17,11 @@ pub(crate) enum TimedStep {
     Encode,
     /// Comparison of an image with its clean frame.
     Measure,
-    /// Images wait until they are asked about.
+    /// Images are ready and wait for a free request.
     Waiting,
     /// No request is in flight, because no image is ready.
     Idle,
-    /// As many requests are in flight as allowed.
+    /// The maximum number of requests is in flight.
     Full,
 }
 
@@ -45,7 +45,7 @@ pub(crate) struct Timings {
 }
 
 impl Timings {
-    /// The result of `action`, whose time is added to a step.
+    /// Runs `action` and adds its time to a step.
     pub(crate) fn time<T>(&self, step: TimedStep, action: impl FnOnce() -> T) -> T {
         let started = Instant::now();
         let result = action();
@@ -61,7 +61,7 @@ impl Timings {
         self.nanoseconds[step as usize].load(Ordering::Relaxed) as f64 / 1e9
     }
 
-    /// One line with the time of each step, and what limited the speed of a run of this duration on `threads` threads.
+    /// One line with the time of each step and the bottleneck of a run that took this time on `threads` threads.
     pub(crate) fn summary(&self, took: Duration, threads: usize) -> String {
         TimingsText {
             timings: self,
@@ -74,6 +74,7 @@ impl Timings {
 
 struct TimingsText<'a> {
     timings: &'a Timings,
+    /// Duration of the run, in seconds.
     took: f64,
     threads: usize,
 }
@@ -134,16 +135,17 @@ impl fmt::Display for TimingsText<'_> {
 mod tests {
     use super::*;
 
+    /// The summary of a run of 10 s on 2 threads, with these seconds per step.
+    fn summary(steps: &[(TimedStep, u64)]) -> String {
+        let timings = Timings::default();
+        for (step, seconds) in steps {
+            timings.add(*step, Duration::from_secs(*seconds));
+        }
+        timings.summary(Duration::from_secs(10), 2)
+    }
+
     #[test]
-    fn the_summary_names_what_limits_the_speed() {
-        let second = Duration::from_secs;
-        let summary = |steps: &[(TimedStep, u64)]| {
-            let timings = Timings::default();
-            for (step, seconds) in steps {
-                timings.add(*step, second(*seconds));
-            }
-            timings.summary(second(10), 2)
-        };
+    fn the_summary_names_the_bottleneck() {
         let line = summary(&[
             (TimedStep::Encode, 12),
             (TimedStep::Decode, 6),

@@ -1,4 +1,4 @@
-//! The threads that images are made on: `Workers`.
+//! Threads that make images: `Workers`.
 
 use std::num::NonZeroUsize;
 
@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::types::Decides;
 use crate::types::flags::threads;
 
-/// Flag of the number of threads that make images.
+/// The flag `--threads`.
 #[derive(Debug, Clone, Copy, Default, Args)]
 pub(crate) struct ThreadArgs {
     /// Threads for synthesis, enhancement and reading, 1024 at most; default: all cores, or as many as a control group allows (Slurm, containers)
@@ -18,45 +18,50 @@ pub(crate) struct ThreadArgs {
 }
 
 impl ThreadArgs {
-    /// The number of threads.
-    pub(crate) fn number(self) -> usize {
-        let one_per_core = || std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
-        self.threads.unwrap_or_else(one_per_core).get()
+    /// Number of threads; by default one per core.
+    pub(crate) fn count(self) -> usize {
+        self.threads
+            .or_else(|| std::thread::available_parallelism().ok())
+            .map_or(1, NonZeroUsize::get)
     }
 }
 
-/// The threads, twice: one pool of all for a shared source, and one pool of a single thread for each source of its own.
+/// Thread pools: one of all threads, for work on one source together, and pools of one thread each, for one source per worker.
 pub(crate) struct Workers {
-    pub(crate) all: ThreadPool,
-    pub(crate) each: Vec<ThreadPool>,
+    pub(crate) shared: ThreadPool,
+    pub(crate) single_threaded: Vec<ThreadPool>,
 }
 
 impl Workers {
-    /// Workers with this many threads; one per core if it is `None`.
+    /// Starts this many threads; by default one per core.
     ///
     /// # Errors
     /// If the operating system refuses to start them.
     pub(crate) fn start(threads: Option<NonZeroUsize>) -> Result<Self> {
-        let all = pool(threads)?;
-        let each = (0..all.current_num_threads()).map(|_| pool(Some(NonZeroUsize::MIN)));
+        let shared = pool(threads)?;
+        let single_threaded = (0..shared.current_num_threads())
+            .map(|_| pool(Some(NonZeroUsize::MIN)))
+            .collect::<Result<_>>()?;
         Ok(Self {
-            each: each.collect::<Result<_>>()?,
-            all,
+            shared,
+            single_threaded,
         })
     }
 }
 
-/// A pool of this many threads; one per core if it is `None`.
+/// A pool of this many threads; by default one per core.
 ///
 /// # Errors
 /// If the operating system refuses to start them.
 pub(crate) fn pool(threads: Option<NonZeroUsize>) -> Result<ThreadPool> {
     let threads = threads.map_or(0, NonZeroUsize::get);
-    let pool = ThreadPoolBuilder::new().num_threads(threads).build();
-    pool.map_err(|e| unstarted(&e))
+    ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(|e| thread_start_error(&e))
 }
 
 /// The error for a thread that the operating system refused to start.
-pub(crate) fn unstarted(problem: &dyn std::fmt::Display) -> Error {
+pub(crate) fn thread_start_error(problem: &dyn std::fmt::Display) -> Error {
     Error::usage("--threads", format_args!("cannot be started: {problem}"))
 }

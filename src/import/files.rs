@@ -11,7 +11,7 @@ use crate::files::reading::{bytes, entries, text};
 use crate::picture::hdf5::Hdf5Array;
 use crate::picture::npy::Npy;
 use crate::picture::raw_png::{RawPng, SampleForm};
-use crate::picture::reading_rule::MOST_PIXELS;
+use crate::picture::reading_rule::MAX_PIXELS;
 use crate::picture::{ImageFile, ReadingRule};
 use crate::types::Rgb;
 
@@ -55,7 +55,7 @@ pub(super) fn first_folder(folder: &Path, names: &[&str]) -> Option<PathBuf> {
 /// Decodes an image of ids, ignoring its EXIF orientation.
 pub(super) fn read_id_image(path: &Path) -> Result<Rgb> {
     let file = ImageFile::open(path, ReadingRule::default())?;
-    file.never_turned().decode()
+    file.ignoring_orientation().decode()
 }
 
 /// Last part of a path, as text.
@@ -73,7 +73,7 @@ pub(super) fn read_png(path: &Path, forms: &[SampleForm]) -> Result<Array2<u16>>
 }
 
 fn decode_png(bytes: &[u8], forms: &[SampleForm]) -> Result<Array2<u16>, String> {
-    let png = RawPng::open(bytes, forms, MOST_PIXELS)?;
+    let png = RawPng::open(bytes, forms, MAX_PIXELS)?;
     let size = png.size;
     Array2::from_shape_vec(size, png.samples(|sample| sample)?).map_err(|e| e.to_string())
 }

@@ -271,14 +271,14 @@ struct ImportedImage {
 
 impl ImportedImage {
     fn read(args: &ImportArgs, adapter: &dyn Adapter, frame: &ListedFrame) -> Result<Self> {
-        let file = ImageFile::open(&frame.rgb, args.folders.decode.rule())?.never_turned();
+        let file = ImageFile::open(&frame.rgb, args.folders.decode.rule())?.ignoring_orientation();
         let rgb = file.decode()?;
         let maps = adapter.read_maps(frame, &rgb)?;
         let has_maps = maps.depth.is_some() || maps.semantic.is_some() || maps.segments.is_some();
         if has_maps || file.note() == InputNote::default() {
             return Ok(Self { file, rgb, maps });
         }
-        let file = file.turned_as_stated();
+        let file = file.applying_orientation();
         let rgb = file.decode()?;
         Ok(Self { file, rgb, maps })
     }
@@ -310,10 +310,10 @@ fn write_frame(
     let source = frame.rgb.file_name().map(|name| name.to_string_lossy());
     line.insert("source".to_owned(), json!(source));
     // Files other than plain PNG are copied unchanged, so that they are decoded as everywhere else.
-    let image = if file.ending() == "png" && note == InputNote::default() {
+    let image = if file.extension() == "png" && note == InputNote::default() {
         output.write("rgb", "png", &png(&rgb)?)?
     } else {
-        output.write("rgb", file.ending(), file.bytes())?
+        output.write("rgb", file.extension(), file.bytes())?
     };
     line.insert("rgb".to_owned(), json!(image));
     let FrameMaps {

@@ -139,7 +139,9 @@ fn room_rows(folder: &Path, progress: &Progress) -> Result<Vec<Row>> {
     let (place, rules) = (DataPlace::Rooms(rooms), Rules::built_in()?);
     let (set, selection) = (SetArgs::default(), SelectionArgs::default());
     let dataset = open_data(
-        (&place, &SceneArgs::default(), &set),
+        &place,
+        &SceneArgs::default(),
+        &set,
         &selection,
         &rules,
         ReadingRule::default(),

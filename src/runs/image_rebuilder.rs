@@ -7,8 +7,8 @@ use clap::Args;
 
 use crate::dataset::{DataArgs, DataPlace, Dataset, Photographs, parse_data_place};
 use crate::error::{Error, Result};
-use crate::images::enhancement::enhancers::{self, EnhancerRunArgs, OpenEnhancers};
-use crate::images::frames::{Frames, Source, Walk, WalkFolder, photographs};
+use crate::images::enhancement::enhancers::{self, EnhancerModels, EnhancerRunArgs};
+use crate::images::frames::{Frames, Source, WalkArgs, WalkFolder, photographs};
 use crate::images::image_pipeline::ImagePipeline;
 use crate::images::image_steps::ImageSteps;
 use crate::images::recipes::Recipe;
@@ -56,7 +56,7 @@ pub(crate) struct ImageRebuilder {
 #[allow(clippy::large_enum_variant, reason = "a run has one")]
 enum FrameData {
     Frames(Dataset),
-    Walks(WalkFolder, Walk),
+    Walks(WalkFolder, WalkArgs),
 }
 
 impl ImageRebuilder {
@@ -87,10 +87,10 @@ impl ImageRebuilder {
             .any(|condition| condition.enhancer.is_some());
         let models = if has_enhanced { &*flags.llie } else { &[] };
         let elsewhere = if has_enhanced { &*flags.enhanced } else { &[] };
-        let files = enhancers::read(models)?;
+        let files = enhancers::read_models(models)?;
         let kinds = KindSettings::resolve(&flags.sensor, &flags.camera)?;
         let recipe = Recipe::new(&kinds, flags.images.image, flags.max_side, &files);
-        let recipe = recipe.with_elsewhere(elsewhere)?;
+        let recipe = recipe.with_enhanced_images(elsewhere)?;
         let (data, recipe) = if let Some(walk) = flags.walk {
             let recipe = recipe.for_walks(&walk);
             let folder = WalkFolder::new(&walk, flags.decode.rule());
@@ -115,7 +115,7 @@ impl ImageRebuilder {
         Ok(Self {
             data,
             recipe,
-            enhancers: OpenEnhancers::load(files, &loading)?.take()?,
+            enhancers: EnhancerModels::load(files, &loading)?.take()?,
         })
     }
 

@@ -165,7 +165,8 @@ impl<D: Detail> Driver<'_, D> {
             Err(error @ Error::Endpoint { .. })
                 if !self.money.is_some_and(|money| money.fail_fast) =>
             {
-                self.progress.say(&format!("stopped: {error}"));
+                self.progress
+                    .print_on_terminal(&format!("stopped: {error}"));
                 let facts = &self.journal.parts[part].facts;
                 self.stopped.add_part(facts, error);
                 Ok(Step::Waiting)
@@ -255,7 +256,7 @@ impl<D: Detail> Driver<'_, D> {
         let before = self.notes.printed.insert(part, what.to_owned());
         if before.as_deref() != Some(what) {
             let line = format!("{}: {what}", self.part(part).name);
-            self.progress.say(&line);
+            self.progress.print_on_terminal(&line);
         }
     }
 

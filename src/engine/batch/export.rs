@@ -92,7 +92,7 @@ pub(super) fn write<E: Experiment>(
         if shows_images {
             dark_already::warn(experiment);
         }
-        pipeline.largest(sources, &plan.sources)
+        pipeline.check_largest_image(sources, &plan.sources)
     })?;
     let usages = pipeline.usages();
     let bar = run.progress.bar("writing requests", plan.remaining());

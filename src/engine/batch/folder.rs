@@ -17,7 +17,7 @@ use super::summary;
 use crate::ask::{AccessArgs, BaseUrl, Endpoint, Sending};
 use crate::error::{Error, Result};
 use crate::images::progress::Progress;
-use crate::images::workers::unstarted;
+use crate::images::workers::thread_start_error;
 use crate::store::Store;
 use crate::types::manifests::RunManifest;
 use darkqa_score::answers::record::Detail;
@@ -170,7 +170,7 @@ pub(super) fn start_runtime() -> Result<runtime::Runtime> {
     runtime::Builder::new_current_thread()
         .enable_all()
         .build()
-        .map_err(|e| unstarted(&e))
+        .map_err(|e| thread_start_error(&e))
 }
 
 /// The base URL of the server: from the flags, or else the one at which the parts were created. `None` if nothing is left to do.

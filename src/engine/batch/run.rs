@@ -21,7 +21,7 @@ use crate::engine::interrupt::Interrupt;
 use crate::engine::models::{self, ModelUnderTest};
 use crate::engine::open_run::{OpenRun, Remaining, answered, every_model};
 use crate::error::{Error, Result};
-use crate::images::enhancement::enhancers::{self, OpenEnhancers};
+use crate::images::enhancement::enhancers::{self, EnhancerModels};
 use crate::images::trials::{Item as _, Stimulus, Trial};
 use crate::report::forecast::money;
 use crate::runs::outcome::Outcome;
@@ -296,8 +296,8 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
     fn reload_enhancers(&mut self) -> Result<()> {
         let settings = self.run.experiment.settings();
         if self.enhancers_used {
-            let files = enhancers::read(&settings.enhancers.llie)?;
-            self.run.enhancers = OpenEnhancers::deferred(files, &settings.loading);
+            let files = enhancers::read_models(&settings.enhancers.llie)?;
+            self.run.enhancers = EnhancerModels::from_files(files, &settings.loading);
         }
         self.enhancers_used = true;
         Ok(())

@@ -319,7 +319,8 @@ pub(crate) fn shown_tokens(
     scaling: Scaling,
 ) -> Option<f64> {
     source.order.iter().try_fold(0.0, |sum, place| {
-        let (width, height) = scaling.size(source.frames[*place].size);
+        let (width, height) = source.frames[*place].size;
+        let (width, height) = scaling.size(width, height);
         Some(sum + charged.or_else(|| image_tokens(model, price, width, height))?)
     })
 }

@@ -135,7 +135,7 @@ impl SampledImages {
             .collect();
         let step = shown.len().div_ceil(SAMPLED_SOURCES).max(1);
         for (i, (part, source, frame)) in shown.into_iter().step_by(step).enumerate() {
-            let mut work = FrameWork::planned(pipeline.steps.without_store(), source, frame);
+            let mut work = FrameWork::for_source(pipeline.steps.without_store(), source, frame);
             let conditions = part.conditions();
             for condition in conditions.filter(|condition| i == 0 || condition.enhancer.is_none()) {
                 let started = Instant::now();

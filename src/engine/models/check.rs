@@ -7,7 +7,7 @@ use super::settings::AskSettings;
 use crate::ask::{Call, ImagePlaces, Message, Query};
 use crate::error::Result;
 use crate::images::progress::Progress;
-use crate::images::workers::unstarted;
+use crate::images::workers::thread_start_error;
 use crate::picture::{Payload, PayloadFormat};
 use crate::types::{Condition, QuestionId, Rgb, View};
 
@@ -36,7 +36,7 @@ pub(crate) fn check(
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_all()
         .build();
-    let runtime = runtime.map_err(|e| unstarted(&e))?;
+    let runtime = runtime.map_err(|e| thread_start_error(&e))?;
     let image = Rgb::new(SIDE, SIDE, RED.repeat(SIDE * SIDE))?;
     let images = [Arc::new(Payload::encode(&image, PayloadFormat::Png)?)];
     let (mut outcomes, mut seen) = (Vec::new(), Vec::new());
@@ -48,7 +48,7 @@ pub(crate) fn check(
         let Some(opened) = open_model(model)? else {
             continue;
         };
-        progress.say(&format!("asking {} ({})", model.name, model.view));
+        progress.print_on_terminal(&format!("asking {} ({})", model.name, model.view));
         let (condition, message, sent) = match model.view {
             View::Blind => (None, Message::text_only(TEXT_QUESTION), "without an image"),
             View::Image => {

@@ -1,4 +1,4 @@
-//! The dark frames that an enhancer is tried on before a run: [`dark_frames`], made of [`DarkFrames`].
+//! The dark frames on which an enhancer is probed before a run: [`DarkFrames`] selects them, [`dark_frames`] makes them.
 
 use std::collections::BTreeSet;
 
@@ -11,16 +11,16 @@ use crate::types::{Condition, EnhancerName, Rgb, Severity};
 use darkqa_enhance::{DARK, FRAMES, brightness};
 use darkqa_light::expose;
 
-/// Exposure drops, in EV, by which frames are darkened if the plan has too few dark ones: that of L3 first.
+/// Exposure drops that darken frames if the plan has too few dark ones; L3 is used first.
 const DROPS: [Severity; 3] = [Severity::L3, Severity::L2, Severity::L4];
 
-/// The frames of a plan on which an enhancer may be tried, at most [`FRAMES`], spread over its sources.
+/// Sources whose middle frames an enhancer is probed on, with the conditions to use. From a plan: at most [`FRAMES`], evenly spaced.
 pub(crate) struct DarkFrames<'a>(Vec<(&'a Source, Vec<Condition>)>);
 
 impl<'a> DarkFrames<'a> {
-    /// The frames of a whole run for the enhancer of this name, with the conditions that it enhances in a shard's plan, photographs in the
-    /// dark apart. So all shards judge an enhancer alike, and one of them judges it for those that share its store. Without such frames
-    /// or conditions, the frames of the plan.
+    /// All sources of a run (`whole`), with the conditions that the enhancer of this name enhances in a shard's plan, except photographs in
+    /// the dark. So all shards probe an enhancer on the same frames, and those that share a store probe it once. Without such sources or
+    /// conditions, the sources of the plan are used.
     pub(crate) fn for_whole_run<I>(
         whole: &'a [Source],
         sources: &'a [Source],
@@ -47,39 +47,43 @@ impl<'a> DarkFrames<'a> {
         )
     }
 
-    /// Frames for the enhancer of this name, with the conditions of the plan that it enhances.
+    /// Sources of a plan, with the conditions that the enhancer of this name enhances.
     pub(crate) fn new<I>(
         sources: &'a [Source],
         plan: &[SourcePlan<I>],
         name: &EnhancerName,
     ) -> Self {
-        let enhanced = |part: &SourcePlan<I>| -> Vec<Condition> {
-            part.conditions()
-                .filter(|&condition| condition.enhancer.as_ref() == Some(name))
-                .cloned()
-                .collect()
-        };
         let parts: Vec<(&Source, Vec<Condition>)> = plan
             .iter()
-            .map(|part| (&sources[part.source], enhanced(part)))
+            .map(|part| {
+                let enhanced: Vec<Condition> = part
+                    .conditions()
+                    .filter(|condition| condition.enhancer.as_ref() == Some(name))
+                    .cloned()
+                    .collect();
+                (&sources[part.source], enhanced)
+            })
             .filter(|(_, conditions)| !conditions.is_empty())
             .collect();
-        let spread = evenly(parts.len(), FRAMES).into_iter();
-        Self(spread.map(|place| parts[place].clone()).collect())
+        Self(
+            evenly_spaced_indices(parts.len(), FRAMES)
+                .into_iter()
+                .map(|index| parts[index].clone())
+                .collect(),
+        )
     }
 
     pub(crate) fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// The sources, of which the middle frame is taken, with their conditions.
+    /// The sources, whose middle frames are used, with their conditions.
     pub(crate) fn frames(&self) -> &[(&'a Source, Vec<Condition>)] {
         &self.0
     }
 }
 
-/// Dark images of these frames, at most [`FRAMES`], in the conditions that the enhancer enhances. Where these are not dark, the frames are
-/// darkened by exposure.
+/// Makes up to [`FRAMES`] dark images of these frames in their conditions. If too few are dark, frames are darkened by an exposure drop.
 ///
 /// # Errors
 /// If a frame cannot be read.
@@ -88,20 +92,24 @@ pub(crate) fn dark_frames(steps: ImageSteps<'_>, frames: &DarkFrames<'_>) -> Res
     let mut conditions = Vec::new();
     for (source, enhanced) in &frames.0 {
         if let Some(frame) = source.middle() {
-            works.push(FrameWork::planned(steps, source, frame));
+            works.push(FrameWork::for_source(steps, source, frame));
             conditions.push(enhanced);
         }
     }
-    let rounds = conditions.iter().map(|conditions| conditions.len()).max();
+    let rounds = conditions
+        .iter()
+        .map(|conditions| conditions.len())
+        .max()
+        .unwrap_or(0);
     let mut found = Vec::new();
-    for round in 0..rounds.unwrap_or(0) {
-        for (place, (work, conditions)) in works.iter_mut().zip(&conditions).enumerate() {
-            // Another condition of each frame, so that all levels and kinds are met.
-            let Some(condition) = conditions.get((place + round) % conditions.len().max(1)) else {
+    for round in 0..rounds {
+        for (index, (work, conditions)) in works.iter_mut().zip(&conditions).enumerate() {
+            // Each frame starts with another condition, so that all levels and kinds are covered.
+            let Some(condition) = conditions.get((index + round) % conditions.len().max(1)) else {
                 continue;
             };
             if found.len() < FRAMES && round < conditions.len() {
-                let resolved = work.resolved(condition)?;
+                let resolved = work.resolve(condition)?;
                 let image = resolved.work.degraded(resolved.condition.degradation())?;
                 if brightness(image) <= DARK {
                     found.push(Rgb::clone(image));
@@ -119,8 +127,8 @@ pub(crate) fn dark_frames(steps: ImageSteps<'_>, frames: &DarkFrames<'_>) -> Res
     Ok(found)
 }
 
-/// Images for an enhancer that is tried without a plan: those of `images` that are dark, and darkened ones if there are too few.
-pub(crate) fn darkened(images: &[Rgb]) -> Vec<Rgb> {
+/// Up to [`FRAMES`] images to probe an enhancer without a plan: the dark ones of `images`, then darkened copies.
+pub(crate) fn dark_or_darkened(images: &[Rgb]) -> Vec<Rgb> {
     let dark = images.iter().filter(|image| brightness(image) <= DARK);
     let darkened = DROPS
         .iter()
@@ -128,9 +136,9 @@ pub(crate) fn darkened(images: &[Rgb]) -> Vec<Rgb> {
     dark.cloned().chain(darkened).take(FRAMES).collect()
 }
 
-/// At most `most` of `count` places, evenly spread.
-pub(crate) fn evenly(count: usize, most: usize) -> Vec<usize> {
-    let taken = count.min(most);
+/// Up to `max` evenly spaced indices below `count`.
+pub(crate) fn evenly_spaced_indices(count: usize, max: usize) -> Vec<usize> {
+    let taken = count.min(max);
     (0..taken)
         .map(|i| (2 * i + 1) * count / (2 * taken))
         .collect()
@@ -141,18 +149,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn places_are_spread_and_never_repeated() {
-        assert!(evenly(0, 6).is_empty());
-        assert_eq!(evenly(2, 6), [0, 1]);
-        assert_eq!(evenly(12, 6), [1, 3, 5, 7, 9, 11]);
-        assert_eq!(evenly(7, 3), [1, 3, 5]);
+    fn indices_are_spread_and_never_repeated() {
+        assert!(evenly_spaced_indices(0, 6).is_empty());
+        assert_eq!(evenly_spaced_indices(2, 6), [0, 1]);
+        assert_eq!(evenly_spaced_indices(12, 6), [1, 3, 5, 7, 9, 11]);
+        assert_eq!(evenly_spaced_indices(7, 3), [1, 3, 5]);
     }
 
     #[test]
     fn bright_images_are_darkened_and_dark_ones_stay() {
-        let image = |code: u8| Rgb::new(8, 8, vec![code; 192]).unwrap();
-        let (dark, bright) = (image(20), image(200));
-        let all = darkened(&[bright.clone(), dark.clone()]);
+        let [dark, bright] = [20, 200].map(|code| Rgb::new(8, 8, vec![code; 192]).unwrap());
+        let all = dark_or_darkened(&[bright.clone(), dark.clone()]);
         assert_eq!(all.len(), 6);
         assert_eq!(all[0], dark);
         assert!(all.iter().all(|image| brightness(image) <= DARK));

@@ -1,4 +1,4 @@
-//! Images that were enhanced elsewhere, from the dark images of `synthesize`: [`EnhancedImages`], the folder of `--enhanced NAME=DIR`.
+//! Images that another program enhanced, from the dark images of `synthesize`: [`EnhancedImages`], the folder of `--enhanced NAME=DIR`.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -11,24 +11,24 @@ use crate::error::{Error, Result};
 use crate::files::reading;
 use crate::images::frames::SourceFrame;
 use crate::images::recipes::ImageRecipe;
-use crate::images::stored::{Sidecar, differing};
+use crate::images::stored::{Sidecar, differing_fields};
 use crate::picture::image_file::format::FileFormat;
 use crate::picture::{ImageFile, ReadingRule};
 use crate::text::words::first_names;
 use crate::types::{Condition, DepthNote, Digest, EnhancerName, FrameId, Rgb};
 use darkqa_enhance::{EnhancedFolder, ImageUse, Implausible, Usage};
 
-/// Number of files that a message names for each fault; chosen.
+/// Maximum number of files named per fault in a message; chosen.
 const NAMED: usize = 4;
-/// Depth of folders in folders below which files are not looked for; chosen, against circles of links.
-const DEEPEST: usize = 16;
+/// Maximum depth of subfolders that are searched; chosen as protection against cyclic links.
+const MAX_DEPTH: usize = 16;
 
-/// The images of one folder. Each has the name of its dark image, and beside it the JSON file that `synthesize` wrote for that.
+/// The images of one folder. Each has the name of its dark image, and next to it the JSON file that `synthesize` wrote for the dark image.
 #[derive(Debug)]
 pub(crate) struct EnhancedImages {
     name: EnhancerName,
     folder: PathBuf,
-    /// Files by their path below the folder, without the JSON files.
+    /// Image files by their path below the folder.
     files: BTreeMap<String, EnhancedFile>,
     usage: Usage,
 }
@@ -37,21 +37,21 @@ pub(crate) struct EnhancedImages {
 #[derive(Debug)]
 struct EnhancedFile {
     digest: Digest,
-    /// Width and height in pixels of an 8-bit PNG; else the faults of the file.
+    /// Width and height of an 8-bit PNG file, in pixels; the error describes a file of another format.
     size: std::result::Result<(u32, u32), String>,
 }
 
-/// A dark image of a run, as `synthesize` would write it.
+/// A dark image of a run with its recipe, as `synthesize` would write it.
 pub(crate) struct DarkImage<'a> {
     pub(crate) frame: &'a SourceFrame,
     pub(crate) condition: &'a Condition,
     pub(crate) recipe: ImageRecipe,
 }
 
-/// A reason why an image cannot be used. Reasons with the same words are reported together.
+/// A reason why an image cannot be used. Images with the same `words` are reported together.
 struct Fault {
     words: &'static str,
-    /// Peculiarities of the file; empty without any.
+    /// Details about this file; may be empty.
     detail: String,
 }
 
@@ -65,7 +65,7 @@ impl Fault {
 }
 
 impl EnhancedImages {
-    /// The images of these folders. Names must differ from each other and from those of `models`.
+    /// Opens the images of these folders. Names must differ from each other and from the names of `models`.
     ///
     /// # Errors
     /// If a folder cannot be read or has no image, or a name is used twice.
@@ -74,10 +74,10 @@ impl EnhancedImages {
         models: impl IntoIterator<Item = &'a EnhancerName>,
     ) -> Result<Vec<Self>> {
         let mut names: BTreeSet<&EnhancerName> = models.into_iter().collect();
-        if let Some(twice) = folders.iter().find(|folder| !names.insert(&folder.name)) {
+        if let Some(repeated) = folders.iter().find(|folder| !names.insert(&folder.name)) {
             let problem = format_args!(
                 "two enhancers are named {}; choose another NAME",
-                twice.name
+                repeated.name
             );
             return Err(Error::usage("--enhanced", problem));
         }
@@ -110,12 +110,12 @@ impl EnhancedImages {
         &self.name
     }
 
-    /// The note about the images, which grows while they are read.
+    /// The usage note, which every read image extends.
     pub(crate) fn usage(&self) -> &Usage {
         &self.usage
     }
 
-    /// The folder, as it was named.
+    /// Path of the folder, as given by the flag.
     pub(crate) fn folder(&self) -> &Path {
         &self.folder
     }
@@ -133,55 +133,55 @@ impl EnhancedImages {
     ///
     /// # Errors
     /// If it is missing.
-    pub(crate) fn digest_of(&self, frame: &FrameId, condition: &Condition) -> Result<Digest> {
+    pub(crate) fn image_digest(&self, frame: &FrameId, condition: &Condition) -> Result<Digest> {
         let path = path(frame, condition)?;
-        let file = self.files.get(&path);
-        let file = file.ok_or_else(|| Error::data(self.folder.join(&path).display(), "missing"))?;
+        let file = self
+            .files
+            .get(&path)
+            .ok_or_else(|| Error::data(self.folder.join(&path).display(), "missing"))?;
         Ok(file.digest)
     }
 
-    /// The image of a frame in a condition, made elsewhere of a degraded one.
+    /// Reads the enhanced image of a frame in a condition and adds it to the usage note. `degraded` is its input.
     ///
     /// # Errors
-    /// If it was changed since it was checked, cannot be decoded, or has another size.
+    /// If the file was changed during the run, cannot be decoded, or has another size than its input.
     pub(crate) fn image(
         &self,
         degraded: &Rgb,
-        (frame, condition): (&FrameId, &Condition),
+        frame: &FrameId,
+        condition: &Condition,
         implausible: Implausible,
     ) -> Result<(Rgb, ImageUse)> {
         let place = self.folder.join(path(frame, condition)?);
-        let wrong = |problem: &str| Error::data(place.display(), problem);
         let file = ImageFile::open(&place, ReadingRule::default())?;
-        if Digest::from_bytes(file.bytes()) != self.digest_of(frame, condition)? {
-            return Err(wrong(
-                "was changed during the run; restore it, or start a new run",
-            ));
+        if Digest::from_bytes(file.bytes()) != self.image_digest(frame, condition)? {
+            let problem = "was changed during the run; restore it, or start a new run";
+            return Err(Error::data(place.display(), problem));
         }
         let image = file.decode()?;
         if (image.height(), image.width()) != (degraded.height(), degraded.width()) {
-            return Err(wrong(
-                "has another size than its dark image; nothing is resized",
-            ));
+            let problem = "has another size than its dark image; nothing is resized";
+            return Err(Error::data(place.display(), problem));
         }
         let used = ImageUse::made_elsewhere([degraded, &image]);
         used.note_made_elsewhere(&self.usage, &self.folder, [frame, condition], implausible)?;
         Ok((image, used))
     }
 
-    /// Checks that each of these dark images has its enhanced one. Images that are missing, have another size or format, or were made
-    /// from other dark images are logged by name, and so are files that belong to none.
+    /// Checks that each of these dark images has an enhanced image. Logs images that are missing, have another size or format, or were made
+    /// from other dark images, and files that no dark image needs.
     ///
     /// # Errors
-    /// If an image cannot be used, or all are the dark images themselves.
+    /// If an image cannot be used, or all images are identical to the dark images.
     pub(crate) fn check(&self, dark: &[DarkImage<'_>]) -> Result<()> {
         let mut faults: BTreeMap<&str, Vec<String>> = BTreeMap::new();
         let mut wanted = BTreeSet::new();
         let mut unchanged = 0;
         for image in dark {
             let path = path(&image.frame.id, image.condition)?;
-            match self.fault(&path, image) {
-                Ok(is_dark) => unchanged += usize::from(is_dark),
+            match self.check_image(&path, image) {
+                Ok(is_unchanged) => unchanged += usize::from(is_unchanged),
                 Err(Fault { words, detail }) => {
                     let named = match &*detail {
                         "" => path.clone(),
@@ -231,11 +231,11 @@ impl EnhancedImages {
         Ok(())
     }
 
-    /// Whether an image is its dark image itself, byte for byte.
+    /// Checks one image; returns true if it is byte for byte its dark image.
     ///
     /// # Errors
     /// The fault of the image.
-    fn fault(&self, path: &str, dark: &DarkImage<'_>) -> std::result::Result<bool, Fault> {
+    fn check_image(&self, path: &str, dark: &DarkImage<'_>) -> std::result::Result<bool, Fault> {
         if dark.condition.pair().is_some() {
             let words =
                 "`synthesize` does not write dark photographs or their matches; see --llie-on";
@@ -245,9 +245,10 @@ impl EnhancedImages {
             let other = self.other_format(path).unwrap_or_default();
             return Err(Fault::new("missing", other));
         };
-        let size = file.size.as_ref();
-        let (width, height) =
-            *size.map_err(|problem| Fault::new("not an 8-bit PNG file", &**problem))?;
+        let (width, height) = *file
+            .size
+            .as_ref()
+            .map_err(|problem| Fault::new("not an 8-bit PNG file", &**problem))?;
         if (width, height) != dark.frame.size {
             let (w, h) = dark.frame.size;
             let words = "another size than the dark image, and nothing is resized";
@@ -265,17 +266,16 @@ impl EnhancedImages {
             let words = "made from another dark image than this run's; call `synthesize` with the same data and the same light flags";
             return Err(Fault::new(
                 words,
-                differences(&sidecar.recipe, &dark.recipe),
+                recipe_differences(&sidecar.recipe, &dark.recipe),
             ));
         }
-        Ok(sidecar.vouches_for(file.digest))
+        Ok(sidecar.has_digest(file.digest))
     }
 
-    /// The name of a file in another format that has the place of an image.
+    /// A note about a file with the name of an image but another extension; `None` if there is no such file.
     fn other_format(&self, path: &str) -> Option<String> {
         let bare = path.strip_suffix("png")?;
-        let mut others = self.files.range(bare.to_owned()..);
-        let (other, _) = others.next()?;
+        let (other, _) = self.files.range(bare.to_owned()..).next()?;
         let ending = other.strip_prefix(bare)?;
         (!ending.contains(['/', '.'])).then(|| format!("only {other} exists"))
     }
@@ -286,16 +286,16 @@ impl EnhancedFile {
         let file = ImageFile::open(path, ReadingRule::default())?;
         Ok(Self {
             digest: Digest::from_bytes(file.bytes()),
-            size: size(&file),
+            size: png_size(&file),
         })
     }
 }
 
-/// Width and height of a PNG file of 8 bits a channel.
+/// Width and height of a PNG file with 8 bits per channel.
 ///
 /// # Errors
-/// A description of the file if it is no 8-bit PNG image.
-fn size(file: &ImageFile) -> std::result::Result<(u32, u32), String> {
+/// A description of the file if it is not an 8-bit PNG image.
+fn png_size(file: &ImageFile) -> std::result::Result<(u32, u32), String> {
     match FileFormat::detect(file.bytes())? {
         FileFormat::Png => {}
         other => return Err(other.name().to_owned()),
@@ -311,35 +311,35 @@ fn size(file: &ImageFile) -> std::result::Result<(u32, u32), String> {
     Ok(size)
 }
 
-/// The fields in which two recipes differ. The state of the sensor follows from the others, and is named only if it alone differs.
-fn differences(one: &ImageRecipe, other: &ImageRecipe) -> String {
-    let stated = [one, other].map(|recipe| {
+/// The fields in which two recipes differ. The sensor state follows from other fields, so it is named only if nothing else differs.
+fn recipe_differences(one: &ImageRecipe, other: &ImageRecipe) -> String {
+    let without_state = [one, other].map(|recipe| {
         let mut fields = json!(recipe);
         if let Some(sensor) = fields.get_mut("sensor").and_then(Value::as_object_mut) {
             sensor.remove("state");
         }
         fields
     });
-    match differing(&stated[0], &stated[1]) {
+    match differing_fields(&without_state[0], &without_state[1]) {
         fields if fields.is_empty() => "other sensor state".to_owned(),
         fields => format!("other {}", fields.join(", ")),
     }
 }
 
-/// The path of an image below its folder: the name that `synthesize` gives it.
+/// The path of an image below its folder, as named by `synthesize`.
 fn path(frame: &FrameId, condition: &Condition) -> Result<String> {
     let raw = Condition::raw(condition.treatment.clone());
     Ok(format!("{}_{raw}.png", stem(frame)?))
 }
 
-/// Adds the files of a folder and of those in it, by their path below the first, without JSON and hidden files.
+/// Adds the files of a folder and its subfolders except JSON and hidden files. `below` is the path of the folder below the first one.
 fn add_files(folder: &Path, below: &str, depth: usize, files: &mut Vec<String>) -> Result<()> {
     for path in reading::entries(folder)? {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         if name.starts_with('.') || name.ends_with(".json") {
             continue;
         }
-        if path.is_dir() && depth < DEEPEST {
+        if path.is_dir() && depth < MAX_DEPTH {
             add_files(&path, &format!("{below}{name}/"), depth + 1, files)?;
         } else if path.is_file() {
             files.push(format!("{below}{name}"));

@@ -1,4 +1,4 @@
-//! The enhancement models of a command, loaded when they are needed: `OpenEnhancers`.
+//! The enhancement models of a command, loaded on demand: [`EnhancerModels`].
 
 use std::path::{Path, PathBuf};
 
@@ -27,7 +27,7 @@ pub(crate) struct EnhancerRunArgs {
 }
 
 impl EnhancerRunArgs {
-    /// The model in a file, in a session with these settings.
+    /// Opens a session of the model in a file with these settings.
     ///
     /// # Errors
     /// If ONNX Runtime is not found, or the file is not a model that it can run.
@@ -45,8 +45,11 @@ impl EnhancerRunArgs {
     }
 }
 
-/// The files of the enhancement models. Two files of the same name are an error.
-pub(crate) fn read(models: &[PathBuf]) -> Result<Vec<ModelFile>> {
+/// Reads the files of enhancement models.
+///
+/// # Errors
+/// If a file cannot be read, or two models have the same name.
+pub(crate) fn read_models(models: &[PathBuf]) -> Result<Vec<ModelFile>> {
     let mut enhancers: Vec<ModelFile> = Vec::new();
     for path in models {
         let file = ModelFile::read(path)?;
@@ -65,75 +68,75 @@ pub(crate) fn read(models: &[PathBuf]) -> Result<Vec<ModelFile>> {
 /// An enhancement model of a command.
 #[expect(clippy::large_enum_variant, reason = "few are alive at a time")]
 pub(crate) enum Model {
-    /// Its file is read.
-    Read(ModelFile),
-    /// It is open; with the digest of what its file stated ([`ModelFile::stated`]).
+    /// Its file, without a session.
+    File(ModelFile),
+    /// Its open session, with the digest of its file and sidecar ([`ModelFile::stated`]).
     Open(Enhancer, Digest),
 }
 
 impl Model {
     pub(crate) fn name(&self) -> &EnhancerName {
         match self {
-            Self::Read(file) => file.name(),
+            Self::File(file) => file.name(),
             Self::Open(enhancer, _) => enhancer.name(),
         }
     }
 
-    /// Path of the file, as messages call it.
+    /// Path of the file, for messages.
     pub(crate) fn path(&self) -> &Path {
         match self {
-            Self::Read(file) => file.path(),
+            Self::File(file) => file.path(),
             Self::Open(enhancer, _) => enhancer.path(),
         }
     }
 
-    /// Digest of all that decides what is found when the model is opened and tried.
+    /// Digest of everything in the model's files that decides the findings of its probe.
     ///
     /// # Errors
     /// If a number of the sidecar is infinite or NaN.
     pub(crate) fn stated(&self) -> Result<Digest> {
         match self {
-            Self::Read(file) => file.stated(),
+            Self::File(file) => file.stated(),
             Self::Open(_, stated) => Ok(*stated),
         }
     }
 
-    /// The model in a session with these settings.
+    /// Opens the session of the model with these settings, unless it is open.
     ///
     /// # Errors
     /// If ONNX Runtime is not found, or the file is not a model that it can run.
     pub(crate) fn open(self, settings: &EnhancerRunArgs) -> Result<Enhancer> {
         match self {
-            Self::Read(file) => settings.open(file),
+            Self::File(file) => settings.open(file),
             Self::Open(enhancer, _) => Ok(enhancer),
         }
     }
 }
 
-/// Enhancement models, loaded or still to be loaded.
-pub(crate) struct OpenEnhancers<'a> {
+/// The enhancement models of a command, loaded or not.
+pub(crate) struct EnhancerModels<'a> {
     settings: &'a EnhancerRunArgs,
     models: Vec<Model>,
     /// ONNX Runtime; `None` if it is not open.
     runtime: Option<Runtime>,
 }
 
-impl<'a> OpenEnhancers<'a> {
-    /// The models in these files, to be loaded later.
-    pub(crate) fn deferred(files: Vec<ModelFile>, settings: &'a EnhancerRunArgs) -> Self {
+impl<'a> EnhancerModels<'a> {
+    /// The models in these files, not loaded yet.
+    pub(crate) fn from_files(files: Vec<ModelFile>, settings: &'a EnhancerRunArgs) -> Self {
         Self {
             settings,
-            models: files.into_iter().map(Model::Read).collect(),
+            models: files.into_iter().map(Model::File).collect(),
             runtime: None,
         }
     }
 
-    /// The models in these files, loaded.
+    /// Loads the models in these files.
     ///
     /// # Errors
     /// If ONNX Runtime is not found, or a file is not a model that it can run.
     pub(crate) fn load(files: Vec<ModelFile>, settings: &'a EnhancerRunArgs) -> Result<Self> {
-        let mut models = Self::deferred(files, settings);
+        let mut models = Self::from_files(files, settings);
         models.open()?;
         Ok(models)
     }
@@ -144,16 +147,16 @@ impl<'a> OpenEnhancers<'a> {
     /// If ONNX Runtime is not found, or a file is not a model that it can run.
     pub(crate) fn open(&mut self) -> Result<()> {
         self.open_runtime()?;
-        let opened = std::mem::take(&mut self.models)
+        self.models = std::mem::take(&mut self.models)
             .into_iter()
             .map(|model| match model {
-                Model::Read(file) => {
+                Model::File(file) => {
                     let stated = file.stated()?;
                     Ok(Model::Open(self.settings.open(file)?, stated))
                 }
                 open @ Model::Open(..) => Ok(open),
-            });
-        self.models = opened.collect::<Result<_>>()?;
+            })
+            .collect::<Result<_>>()?;
         Ok(())
     }
 
@@ -168,10 +171,10 @@ impl<'a> OpenEnhancers<'a> {
         Ok(())
     }
 
-    /// The models, all of them loaded.
+    /// Takes all models out, loaded.
     ///
     /// # Errors
-    /// As by [`Self::open`].
+    /// See [`Self::open`].
     pub(crate) fn take(&mut self) -> Result<Vec<Enhancer>> {
         self.take_models()?
             .into_iter()
@@ -179,7 +182,7 @@ impl<'a> OpenEnhancers<'a> {
             .collect()
     }
 
-    /// The models as they are; ONNX Runtime is open then.
+    /// Takes all models out, loaded or not, and opens ONNX Runtime.
     ///
     /// # Errors
     /// If it is not found.

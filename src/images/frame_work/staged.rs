@@ -1,78 +1,78 @@
-//! One image of a frame: made as far as possible without an enhancer ([`StagedImage`]), and as it is sent ([`MadeImage`]).
+//! One image of a frame before its enhancer ([`StagedImage`]) and as it is sent ([`PreparedImage`]).
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::FrameWork;
-use super::pairs::{Resolved, paired};
+use super::pairs::{Resolved, with_pair_facts};
 use crate::error::Result;
 use crate::images::image_steps::ImageSteps;
 use crate::images::notes::similarity;
-use crate::images::stored::{MadeNotes, Needed, Similarity, StoredPlace};
+use crate::images::stored::{Needed, Similarity, StoredNotes, StoredPlace};
 use crate::images::timings::TimedStep;
 use crate::picture::Payload;
 use crate::types::{Condition, EnhancerName, ExposureFacts, InputNote, PairFacts, Rgb};
 use darkqa_enhance::ImageUse;
 
 /// An image as it is sent, with facts about it.
-pub(crate) struct MadeImage<'a> {
+pub(crate) struct PreparedImage<'a> {
     pub(crate) payload: Arc<Payload>,
     pub(crate) pixels: PixelsSent,
     /// Similarity to the clean frame; `None` if it was not wanted.
     pub(crate) similarity: Option<Similarity>,
-    /// Place in the store; `None` if it is not kept there.
+    /// Place in the store; `None` if the image is not stored.
     pub(crate) place: Option<StoredPlace<'a>>,
 }
 
-/// The pixels of an image that is sent.
+/// Where the pixels of a sent image are.
 pub(crate) enum PixelsSent {
-    /// Encoded now.
+    /// In memory, because they were just encoded.
     Encoded(Arc<Rgb>),
     /// In the file of the frame, which is sent unchanged.
-    OfFile,
-    /// In a file of the image store, not decoded.
+    InFrameFile,
+    /// In the image store, not decoded.
     Stored,
 }
 
-/// An image that is ready, or waits for its enhancer.
+/// An image that is ready, or that its enhancer must still process.
 pub(crate) enum StagedImage<'a> {
-    Ready(MadeImage<'a>),
-    /// An image of an enhancer from the store, of which the enhancer is told.
+    Ready(PreparedImage<'a>),
+    /// An enhanced image from the store. Its notes must still be added to the usage of its enhancer.
     Stored {
-        image: MadeImage<'a>,
+        image: PreparedImage<'a>,
         enhancer: EnhancerName,
-        notes: MadeNotes,
+        notes: StoredNotes,
     },
     ToEnhance {
         degraded: Arc<Rgb>,
         enhancer: EnhancerName,
-        finish: Finish<'a>,
+        finish: ImageFinisher<'a>,
     },
 }
 
-/// The steps that turn the pixels of an image into a [`MadeImage`]: encode, compare with the clean frame, store.
-pub(crate) struct Finish<'a> {
+/// The steps that turn the pixels of an image into a [`PreparedImage`]: encode, compare with the clean frame, store.
+pub(crate) struct ImageFinisher<'a> {
     steps: ImageSteps<'a>,
-    /// How the file of the frame was read.
+    /// Changes that reading the frame made besides decoding it.
     note: InputNote,
     /// The camera's exposure; `None` for a kind that leaves it open.
     exposure: Option<ExposureFacts>,
-    /// How dark the photograph of the frame is; `None` without a darkness of pairs.
+    /// How dark the photograph of the frame is; `None` if the condition has no pair.
     pair: Option<PairFacts>,
     place: Option<StoredPlace<'a>>,
     /// The clean frame in the size sent; `None` if the image is not compared with it.
     clean: Option<Arc<Rgb>>,
     /// Similarity from the store.
     known: Option<Similarity>,
-    /// Time that the pixels took.
+    /// Time spent on the pixels so far.
     pub(crate) took: Duration,
 }
 
 impl<'a> FrameWork<'a> {
-    /// The frame in a condition: as it is sent, or as the enhancer takes it. Taken from the store if all that is needed is there.
+    /// Prepares the frame in a condition: as it is sent, or as input of its enhancer. Uses the store if it has everything needed.
     ///
     /// # Errors
-    /// If the frame cannot be read, or the condition cannot be made of it.
+    /// If the frame cannot be read, or cannot be shown in the condition.
     pub(crate) fn stage(
         &mut self,
         condition: &Condition,
@@ -82,24 +82,25 @@ impl<'a> FrameWork<'a> {
             work,
             condition,
             pair,
-        } = self.resolved(condition)?;
+        } = self.resolve(condition)?;
         let steps = work.steps;
         let place = work.stored_place(&condition)?;
         if let Some(payload) = work.unchanged_file(&condition)? {
-            return Ok(StagedImage::Ready(MadeImage {
-                payload: paired(payload, pair),
-                pixels: PixelsSent::OfFile,
+            return Ok(StagedImage::Ready(PreparedImage {
+                payload: with_pair_facts(payload, pair),
+                pixels: PixelsSent::InFrameFile,
                 similarity: None,
                 place,
             }));
         }
         let (note, exposure) = (work.note()?, work.exposure(&condition)?);
-        let stored = place.as_ref();
-        let stored = stored.and_then(|place| steps.stored_image(place, needed));
-        if let Some(stored) = stored {
+        if let Some(stored) = place
+            .as_ref()
+            .and_then(|place| steps.stored_image(place, needed))
+        {
             let payload = steps.stored_payload(stored.payload, &note, exposure)?;
-            let image = MadeImage {
-                payload: paired(payload, pair),
+            let image = PreparedImage {
+                payload: with_pair_facts(payload, pair),
                 pixels: PixelsSent::Stored,
                 similarity: stored.notes.similarity,
                 place,
@@ -115,10 +116,12 @@ impl<'a> FrameWork<'a> {
         }
         let started = Instant::now();
         let is_compared = needed == Needed::Similarity;
-        let known = place.as_ref().filter(|_| is_compared);
-        let known = known.and_then(|place| steps.stored_measures(place));
+        let known = place
+            .as_ref()
+            .filter(|_| is_compared)
+            .and_then(|place| steps.stored_similarity(place));
         let clean = (is_compared && known.is_none()).then(|| work.clean_as_sent());
-        let finish = Finish {
+        let finish = ImageFinisher {
             steps,
             note,
             exposure,
@@ -129,7 +132,7 @@ impl<'a> FrameWork<'a> {
             took: Duration::ZERO,
         };
         let degraded = Arc::clone(work.degraded(condition.degradation())?);
-        let finish = Finish {
+        let finish = ImageFinisher {
             took: started.elapsed(),
             ..finish
         };
@@ -144,26 +147,27 @@ impl<'a> FrameWork<'a> {
     }
 }
 
-impl<'a> Finish<'a> {
-    /// The image of these pixels, which is also kept in the store. `enhanced` is what the note of its enhancer got from it.
+impl<'a> ImageFinisher<'a> {
+    /// Encodes pixels and stores the image. `enhanced` is what the image adds to the usage of its enhancer.
     ///
     /// # Errors
-    /// If it cannot be encoded, or is larger than the endpoint takes.
+    /// If it cannot be encoded, or is larger than the endpoint accepts.
     pub(crate) fn image(
         self,
         pixels: &Arc<Rgb>,
         enhanced: Option<ImageUse>,
-    ) -> Result<MadeImage<'a>> {
+    ) -> Result<PreparedImage<'a>> {
         let started = Instant::now();
         let (payload, encoded) = self.steps.payload(pixels, &self.note, self.exposure)?;
         let measuring = Instant::now();
         let measured = self.clean.map(|clean| {
-            let measure = || similarity([&*encoded, &*clean]);
-            self.steps.timings.time(TimedStep::Measure, measure)
+            self.steps
+                .timings
+                .time(TimedStep::Measure, || similarity(&encoded, &clean))
         });
         let similarity = self.known.or(measured.transpose()?);
         if let Some(place) = self.place.as_ref().filter(|_| self.known.is_none()) {
-            let notes = MadeNotes {
+            let notes = StoredNotes {
                 enhanced,
                 similarity,
             };
@@ -174,8 +178,8 @@ impl<'a> Finish<'a> {
             };
             self.steps.store(place, &payload, &notes, took);
         }
-        Ok(MadeImage {
-            payload: paired(payload, self.pair),
+        Ok(PreparedImage {
+            payload: with_pair_facts(payload, self.pair),
             pixels: PixelsSent::Encoded(encoded),
             similarity,
             place: self.place,

@@ -1,4 +1,4 @@
-//! Counts of what was done to images when they were read, from several threads: [`InputTally`].
+//! Thread-safe counts of changes made to images when they were read: [`InputTally`].
 
 use std::sync::{Mutex, PoisonError};
 
@@ -16,7 +16,7 @@ impl InputTally {
         summary.add(frame, note);
     }
 
-    /// Prints what was done, in one line for each thing.
+    /// Logs one warning per kind of change.
     pub(crate) fn warn(self) {
         let summary = self.0.into_inner();
         warn_of_inputs(&summary.unwrap_or_else(PoisonError::into_inner));

@@ -11,19 +11,19 @@ use darkqa_light::PairEv;
 pub(crate) struct SourcePhotograph {
     /// Name of the condition in which it is shown.
     pub(crate) name: PhotoName,
-    /// Digest of the file and of the rule by which it is read.
+    /// Digest of the file and of its reading rule.
     pub(crate) digest: Digest,
     /// Changes that reading the file makes besides decoding its codes.
     pub(crate) note: InputNote,
-    /// Exposure drop that the data state, in EV; `None` if they do not.
+    /// Exposure drop stated in the data set, in EV; `None` if unknown.
     pub(crate) stated: Option<f64>,
-    /// How dark it is; `None` if it was not measured yet, because no key depends on it.
+    /// How dark the photograph is; `None` before it is measured. No store key depends on it.
     pub(crate) facts: Option<PairFacts>,
 }
 
 impl SourcePhotograph {
-    /// How dark it is beside its frame.
-    pub(crate) fn measured(&self, normal: &Rgb, low: &Rgb) -> PairFacts {
+    /// Measures how dark the photograph (`low`) is compared with its frame (`normal`).
+    pub(crate) fn measure(&self, normal: &Rgb, low: &Rgb) -> PairFacts {
         let measured = PairEv::measure(normal, low);
         PairFacts {
             stated: self.stated,
@@ -35,8 +35,8 @@ impl SourcePhotograph {
 }
 
 /// The degradation of this kind that is as dark as the first of these photographs, rounded to a hundredth of an EV; `None` if the
-/// darkness is not known, or is no drop that synthesis can make.
-pub(crate) fn matched(
+/// exposure drop is unknown or cannot be synthesised.
+pub(crate) fn matching_degradation(
     photos: &[SourcePhotograph],
     kind: Kind,
     reading: Option<&ReadingName>,

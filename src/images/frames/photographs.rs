@@ -1,12 +1,11 @@
-//! All photographs in the dark, before anything is asked: their [`names`], and how dark they are ([`tell`], [`measure`]).
+//! Photographs in the dark of all frames: their [`names`], and how dark they are ([`print_darkness`], [`measure`]).
 
 use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
-use crate::dataset::Picture;
 use crate::error::{Error, Result};
-use crate::images::frames::photograph::{SourcePhotograph, matched};
+use crate::images::frames::photograph::{SourcePhotograph, matching_degradation};
 use crate::images::frames::source::{Frames, Source, SourceFrame};
 use crate::images::progress::Progress;
 use crate::types::{PairDark, PairFacts, PhotoName};
@@ -16,45 +15,51 @@ use darkqa_score::photographs::realism::scene::SceneMatch;
 /// Maximum number of frames whose photographs are measured before a run; chosen.
 const SAMPLED: usize = 24;
 
-/// The names of the photographs of all frames, by their place in the lists of the frames.
+/// The names of the photographs of all frames, ordered by their lowest position in the lists of the frames.
 pub(crate) fn names(sources: &[Source]) -> Vec<PhotoName> {
     let frames = sources.iter().flat_map(|source| &source.frames);
-    let mut places = BTreeMap::<&PhotoName, usize>::new();
-    for (place, photo) in frames.flat_map(|frame| frame.photographs.iter().enumerate()) {
-        let first = places.entry(&photo.name).or_insert(place);
-        *first = place.min(*first);
+    let mut positions = BTreeMap::<&PhotoName, usize>::new();
+    for (position, photo) in frames.flat_map(|frame| frame.photographs.iter().enumerate()) {
+        let lowest = positions.entry(&photo.name).or_insert(position);
+        *lowest = position.min(*lowest);
     }
-    let mut names: Vec<(usize, &PhotoName)> =
-        places.into_iter().map(|(name, at)| (at, name)).collect();
+    let mut names: Vec<(usize, &PhotoName)> = positions
+        .into_iter()
+        .map(|(name, position)| (position, name))
+        .collect();
     names.sort_unstable();
     names.into_iter().map(|(_, name)| name.clone()).collect()
 }
 
-/// Prints how dark the photographs are, on a sample of the frames, and what is odd about them: of how many frames there are none, which
-/// show another scene, and what [`PairDarkness::warnings`] finds. A file that cannot be decoded is left out: its trial states so.
-pub(crate) fn tell(frames: &dyn Frames, sources: &[Source], progress: &Progress) {
+/// Measures the photographs of a sample of the frames and prints how dark they are. Warns if frames have no photograph, if a photograph
+/// shows another scene, and of the findings of [`PairDarkness::warnings`]. Broken files are skipped; their trials report the error.
+pub(crate) fn print_darkness(frames: &dyn Frames, sources: &[Source], progress: &Progress) {
     let all: Vec<&SourceFrame> = sources.iter().flat_map(|source| &source.frames).collect();
     for name in names(sources) {
-        let of: Vec<(&SourceFrame, &SourcePhotograph)> = all
+        let pairs: Vec<(&SourceFrame, &SourcePhotograph)> = all
             .iter()
             .filter_map(|frame| Some((*frame, frame.photograph(&name)?)))
             .collect();
-        let sample = of.len().min(SAMPLED);
-        let measured = (0..sample).into_par_iter().filter_map(|index| {
-            let (frame, photo) = of[index * of.len() / sample];
-            let normal = frames.picture(&frame.id).ok()?.pixels().ok()?.codes();
-            let low = frames.photograph(&frame.id, &photo.name).ok()?;
-            let low = low.pixels().ok()?.codes();
-            let facts = photo.measured(&normal, &low);
-            let is_of_one_size = (normal.height(), normal.width()) == (low.height(), low.width());
-            let drop = facts.ev().filter(|_| is_of_one_size);
-            let other =
-                drop.is_some_and(|ev| SceneMatch::new(&normal, &low, ev).is_of_two_scenes());
-            Some((facts, other.then(|| frame.id.0.clone())))
-        });
-        let (facts, others): (Vec<PairFacts>, Vec<Option<String>>) = measured.unzip();
+        let sample = pairs.len().min(SAMPLED);
+        let (facts, others): (Vec<PairFacts>, Vec<Option<String>>) = (0..sample)
+            .into_par_iter()
+            .filter_map(|index| {
+                let (frame, photo) = pairs[index * pairs.len() / sample];
+                let normal = frames.picture(&frame.id).ok()?.pixels().ok()?.codes();
+                let low = frames.photograph(&frame.id, &photo.name).ok()?;
+                let low = low.pixels().ok()?.codes();
+                let facts = photo.measure(&normal, &low);
+                let has_same_size =
+                    (normal.height(), normal.width()) == (low.height(), low.width());
+                let shows_other_scene = facts
+                    .ev()
+                    .filter(|_| has_same_size)
+                    .is_some_and(|ev| SceneMatch::new(&normal, &low, ev).is_of_two_scenes());
+                Some((facts, shows_other_scene.then(|| frame.id.0.clone())))
+            })
+            .unzip();
         let others: Vec<String> = others.into_iter().flatten().collect();
-        let missing = all.len() - of.len();
+        let missing = all.len() - pairs.len();
         if missing > 0 {
             tracing::warn!(
                 "{missing} of {} frames have no photograph {name}; they are not asked in that condition",
@@ -73,11 +78,11 @@ pub(crate) fn tell(frames: &dyn Frames, sources: &[Source], progress: &Progress)
             );
             continue;
         };
-        progress.say(&format!(
+        progress.print_on_terminal(&format!(
             "{name}: {}, in {} of {} photographs",
             darkness.long(),
             darkness.frames,
-            of.len()
+            pairs.len()
         ));
         for oddity in darkness.warnings() {
             tracing::warn!("{oddity}");
@@ -85,7 +90,7 @@ pub(crate) fn tell(frames: &dyn Frames, sources: &[Source], progress: &Progress)
     }
 }
 
-/// Warns of frames that cannot be made as dark as their photographs.
+/// Warns if some frames cannot be made as dark as their photographs.
 ///
 /// # Errors
 /// If no frame can.
@@ -94,9 +99,10 @@ pub(crate) fn check_matches(sources: &[Source], matches: &[PairDark]) -> Result<
         return Ok(());
     };
     let frames: Vec<&SourceFrame> = sources.iter().flat_map(|source| &source.frames).collect();
-    let can =
-        |frame: &&&SourceFrame| matched(&frame.photographs, *kind, reading.as_ref()).is_some();
-    let count = frames.iter().filter(can).count();
+    let count = frames
+        .iter()
+        .filter(|frame| matching_degradation(&frame.photographs, *kind, reading.as_ref()).is_some())
+        .count();
     if count == 0 && !frames.is_empty() {
         let problem = "match makes each frame as dark as its photograph, and no frame has one that is darker than it; leave out match, \
                        or name photographs as \"dark\" in frames.jsonl or with --pairs";
@@ -112,7 +118,7 @@ pub(crate) fn check_matches(sources: &[Source], matches: &[PairDark]) -> Result<
     Ok(())
 }
 
-/// Measures the first photograph of each frame, for synthetic images that are as dark. Each file is decoded once more.
+/// Measures the first photograph of each frame, so that equally dark images can be synthesised. Each file is decoded once more.
 ///
 /// # Errors
 /// If a file is broken.
@@ -120,10 +126,10 @@ pub(crate) fn measure(frames: &dyn Frames, sources: &mut [Source]) -> Result<()>
     sources.par_iter_mut().try_for_each(|source| {
         for frame in &mut source.frames {
             if let Some(photo) = frame.photographs.first_mut() {
-                let decode = |picture: Picture| Ok::<_, Error>(picture.pixels()?.codes());
-                let normal = decode(frames.picture(&frame.id)?)?;
-                let low = decode(frames.photograph(&frame.id, &photo.name)?)?;
-                photo.facts = Some(photo.measured(&normal, &low));
+                let normal = frames.picture(&frame.id)?.pixels()?.codes();
+                let low = frames.photograph(&frame.id, &photo.name)?;
+                let low = low.pixels()?.codes();
+                photo.facts = Some(photo.measure(&normal, &low));
             }
         }
         Ok(())

@@ -1,4 +1,4 @@
-//! Recorded walks through houses (OpenEQA): the reader of their folder ([`WalkFolder`]) and the flags for their frames ([`Walk`]).
+//! Recorded walks through houses (OpenEQA): their folder ([`WalkFolder`]) and the flags for their frames ([`WalkArgs`]).
 
 use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
@@ -20,7 +20,7 @@ use crate::types::{Decides, FrameId};
 /// Flags that decide which frames of a walk are shown, and how.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "OpenEQA")]
-pub(crate) struct Walk {
+pub(crate) struct WalkArgs {
     /// The folder of walks: the frames of a question lie in DIR/EPISODE_HISTORY/*-rgb.png
     #[arg(id = "frames", long, value_name = "DIR", add = Decides::Reply)]
     pub folder: PathBuf,
@@ -48,7 +48,7 @@ pub(crate) enum DegradeStage {
     Resized,
 }
 
-/// Group of frames that share one camera state.
+/// The frames that share one camera state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum CameraScope {
@@ -70,7 +70,7 @@ fn longer_side(text: &str) -> Result<Scaling, String> {
     }
 }
 
-/// Folder of walks, each a folder of frames. A frame has the id `WALK/FRAME`, without the extension.
+/// Folder of walks, each a folder of frames. The id of a frame is `WALK/FRAME`, without the file extension.
 #[derive(Debug)]
 pub(crate) struct WalkFolder {
     folder: PathBuf,
@@ -90,7 +90,7 @@ impl Frames for WalkFolder {
 }
 
 impl WalkFolder {
-    pub(crate) fn new(walk: &Walk, rule: ReadingRule) -> Self {
+    pub(crate) fn new(walk: &WalkArgs, rule: ReadingRule) -> Self {
         Self {
             folder: walk.folder.clone(),
             rule,
@@ -102,7 +102,7 @@ impl WalkFolder {
     pub(crate) fn inspect(
         &self,
         names: &[String],
-        settings: &Walk,
+        settings: &WalkArgs,
         progress: &Progress,
     ) -> Vec<Source> {
         let bar = progress.bar("reading walks", names.len());
@@ -113,7 +113,7 @@ impl WalkFolder {
                 bar.inc();
                 source.unwrap_or_else(|problem| Source {
                     problem: Some(problem.to_string()),
-                    ..Source::unseen(FrameId(name.clone()))
+                    ..Source::without_frames(FrameId(name.clone()))
                 })
             })
             .collect()
@@ -123,7 +123,7 @@ impl WalkFolder {
     ///
     /// # Errors
     /// If the folder of the walk is missing or has no frame, or if a sampled frame is broken.
-    pub(crate) fn source(&self, name: &str, settings: &Walk) -> Result<Source> {
+    pub(crate) fn source(&self, name: &str, settings: &WalkArgs) -> Result<Source> {
         let paths = walk_frames(&self.folder, name)?;
         let sample = sample_indices(paths.len(), settings.frames.get());
         // A frame that is sampled twice is read once: `order` refers to it by its position.

@@ -1,4 +1,4 @@
-//! Opening the enhancers of a plan, as far as they are needed, and trying them on dark frames.
+//! Opening the enhancers that a plan needs, and probing them on dark frames.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -6,7 +6,7 @@ use std::time::Instant;
 use super::ImagePipeline;
 use crate::error::Result;
 use crate::images::enhancement::enhancers::{EnhancerRunArgs, Model};
-use crate::images::enhancement::{DarkFrames, EnhancedImages, RestingEnhancer, dark_frames};
+use crate::images::enhancement::{DarkFrames, EnhancedImages, LazyEnhancer, dark_frames};
 use crate::images::frame_work::FrameWork;
 use crate::images::frames::Source;
 use crate::images::stored::FindingsPlace;
@@ -15,38 +15,38 @@ use crate::images::trials::SourcePlan;
 use crate::types::EnhancerName;
 use darkqa_enhance::{Enhancer, FRAMES, Findings, Stopper, Usage};
 
-/// Ends the runs of an enhancer from another thread.
+/// Handle that stops an enhancer from another thread.
 pub(crate) enum EnhancerStopper {
-    /// Of an open session.
+    /// An open session.
     Open(Stopper),
-    /// Of a session that may be opened in the meantime.
-    Resting(Arc<RestingEnhancer>),
+    /// A session that may be opened later.
+    Lazy(Arc<LazyEnhancer>),
 }
 
 impl EnhancerStopper {
-    /// Stops the current image, and every later one.
+    /// Stops the current image and all later ones.
     pub(crate) fn stop(&self) {
         match self {
             Self::Open(stopper) => stopper.stop(),
-            Self::Resting(enhancer) => enhancer.stop(),
+            Self::Lazy(enhancer) => enhancer.stop(),
         }
     }
 }
 
-/// The stored state of an enhancer and of its images.
-enum Known<'a> {
-    /// Nothing: it is opened and tried, and what is found is kept at this place, if there is a store.
+/// Contents of the image store about an enhancer.
+enum StoredState<'a> {
+    /// Nothing, so the enhancer is opened and probed. The findings are written to this place, if there is a store.
     Nothing(Option<FindingsPlace<'a>>),
     /// The findings of the probe.
     Findings(Findings),
-    /// The findings of the probe, and all images of the plan.
+    /// The findings of the probe and all images of the plan.
     All(Findings),
 }
 
 impl<'a> ImagePipeline<'a> {
-    /// Adds these models. Each one that the plan needs is opened and tried on a few dark frames, so that one whose images cannot be
-    /// enhanced images, or whose value ranges are unknown, is found before anything is asked. What the store knows is not found out
-    /// again, and a model all of whose images it has is not opened.
+    /// Adds these models. Each one that the plan needs is opened and probed on a few dark frames, so that implausible output or unknown
+    /// value ranges are found before anything is asked. A model is not probed if the store has its findings, and not opened if the store
+    /// also has all its images.
     ///
     /// # Errors
     /// If a model cannot be opened, its images are implausible, or a frame cannot be read.
@@ -58,18 +58,18 @@ impl<'a> ImagePipeline<'a> {
         plan: &[SourcePlan<I>],
     ) -> Result<()> {
         for model in models {
-            match (self.known(&model, sources, plan)?, model) {
-                (Known::All(findings), Model::Read(file)) => {
-                    let resting = RestingEnhancer::new(file, settings.clone(), findings);
-                    self.resting.push(Arc::new(resting));
+            match (self.stored_state(&model, sources, plan)?, model) {
+                (StoredState::All(findings), Model::File(file)) => {
+                    let lazy = LazyEnhancer::new(file, settings.clone(), findings);
+                    self.lazy.push(Arc::new(lazy));
                 }
-                (Known::All(findings) | Known::Findings(findings), model) => {
+                (StoredState::All(findings) | StoredState::Findings(findings), model) => {
                     findings.warn(model.name(), model.path());
                     let enhancer = model.open(settings)?;
                     let enhancer = enhancer.tried_before(&findings, findings.usage())?;
                     self.enhancers.push(enhancer);
                 }
-                (Known::Nothing(place), model) => {
+                (StoredState::Nothing(place), model) => {
                     let started = Instant::now();
                     let mut enhancer = model.open(settings)?;
                     self.probe_one(&mut enhancer, sources, plan)?;
@@ -80,17 +80,17 @@ impl<'a> ImagePipeline<'a> {
                 }
             }
         }
-        for images in &self.steps.recipe.elsewhere {
-            self.look_at(images, sources, plan)?;
+        for images in &self.steps.recipe.enhanced_images {
+            self.judge_enhanced_images(images, sources, plan)?;
         }
         Ok(())
     }
 
-    /// Looks at images that were enhanced elsewhere, until enough of dark frames were seen for a verdict.
+    /// Judges whether images that were enhanced elsewhere are plausible, on up to [`FRAMES`] images of dark frames.
     ///
     /// # Errors
     /// If most are implausible, or a file cannot be read.
-    fn look_at<I>(
+    fn judge_enhanced_images<I>(
         &mut self,
         images: &EnhancedImages,
         sources: &[Source],
@@ -98,13 +98,13 @@ impl<'a> ImagePipeline<'a> {
     ) -> Result<()> {
         let frames = DarkFrames::new(sources, plan, images.name());
         let steps = self.steps.without_store();
-        for (place, (source, conditions)) in frames.frames().iter().enumerate() {
+        for (index, (source, conditions)) in frames.frames().iter().enumerate() {
             let Some(frame) = source.middle() else {
                 continue;
             };
-            let mut work = FrameWork::planned(steps, source, frame);
-            // Another condition of each frame first, so that all levels and kinds are met.
-            let (before, after) = conditions.split_at(place % conditions.len());
+            let mut work = FrameWork::for_source(steps, source, frame);
+            // Each frame starts with another condition, so that all levels and kinds are covered.
+            let (before, after) = conditions.split_at(index % conditions.len());
             for condition in after.iter().chain(before) {
                 if images.usage().note().judged.images >= FRAMES {
                     return Ok(());
@@ -115,7 +115,7 @@ impl<'a> ImagePipeline<'a> {
         Ok(())
     }
 
-    /// The frames that an enhancer is tried on.
+    /// The frames on which an enhancer is probed.
     fn dark_frames<'s, I>(
         &self,
         sources: &'s [Source],
@@ -129,39 +129,39 @@ impl<'a> ImagePipeline<'a> {
     }
 
     /// The stored state of a model.
-    fn known<I>(
+    fn stored_state<I>(
         &self,
         model: &Model,
         sources: &[Source],
         plan: &[SourcePlan<I>],
-    ) -> Result<Known<'a>> {
+    ) -> Result<StoredState<'a>> {
         let Some(stored) = self.steps.stored else {
-            return Ok(Known::Nothing(None));
+            return Ok(StoredState::Nothing(None));
         };
         let recipe = self.steps.recipe;
         let frames = self.dark_frames(sources, plan, model.name());
         if frames.is_empty() {
-            // It enhances nothing in this plan, so nothing is tried.
-            return Ok(Known::Nothing(None));
+            // The model enhances nothing in this plan, so it is not probed.
+            return Ok(StoredState::Nothing(None));
         }
         let place = stored.findings().place(recipe, model, frames.frames())?;
         let findings = place.read();
         let Some(findings) = findings.filter(|findings| findings.allow(self.implausible)) else {
-            return Ok(Known::Nothing(Some(place)));
+            return Ok(StoredState::Nothing(Some(place)));
         };
         for part in plan {
             for condition in part.conditions() {
                 if condition.enhancer.as_ref() == Some(model.name())
                     && !stored.has_all(recipe, &sources[part.source], condition)?
                 {
-                    return Ok(Known::Findings(findings));
+                    return Ok(StoredState::Findings(findings));
                 }
             }
         }
-        Ok(Known::All(findings))
+        Ok(StoredState::All(findings))
     }
 
-    /// Tries each enhancer on a few dark frames of a plan.
+    /// Probes each enhancer on a few dark frames of a plan.
     ///
     /// # Errors
     /// If its images are implausible, or a frame cannot be read.
@@ -185,37 +185,38 @@ impl<'a> ImagePipeline<'a> {
         if dark.is_empty() {
             return Ok(());
         }
-        let probe = || enhancer.probe(&dark, self.implausible);
-        self.steps.timings.time(TimedStep::Enhance, probe)
+        self.steps.timings.time(TimedStep::Enhance, || {
+            enhancer.probe(&dark, self.implausible)
+        })
     }
 
-    /// Handles that stop each enhancer.
+    /// Handles that stop the enhancers.
     pub(crate) fn stoppers(&self) -> Vec<EnhancerStopper> {
         let open = self
             .enhancers
             .iter()
-            .chain(self.sets.iter().flatten())
+            .chain(self.enhancer_sets.iter().flatten())
             .map(|enhancer| EnhancerStopper::Open(enhancer.stopper()));
-        let resting = self.resting.iter().cloned().map(EnhancerStopper::Resting);
-        open.chain(resting).collect()
+        let lazy = self.lazy.iter().cloned().map(EnhancerStopper::Lazy);
+        open.chain(lazy).collect()
     }
 
-    /// The notes of the enhancers, by name.
+    /// The usage notes of all enhancers, with their names.
     pub(crate) fn usages(&self) -> Vec<(EnhancerName, Usage)> {
         let open = self
             .enhancers
             .iter()
             .map(|enhancer| (enhancer.name().clone(), enhancer.usage()));
-        let resting = self
-            .resting
+        let lazy = self
+            .lazy
             .iter()
             .map(|enhancer| (enhancer.name().clone(), enhancer.usage().clone()));
-        let elsewhere = self
+        let imported = self
             .steps
             .recipe
-            .elsewhere
+            .enhanced_images
             .iter()
             .map(|images| (images.name().clone(), images.usage().clone()));
-        open.chain(resting).chain(elsewhere).collect()
+        open.chain(lazy).chain(imported).collect()
     }
 }

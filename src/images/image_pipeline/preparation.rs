@@ -1,14 +1,14 @@
-//! Preparation before the first question: images are made to find errors, enhancers are tried, and opened for each worker.
+//! Preparation before the first question: test images, probes of the enhancers, and a set of enhancers for each worker.
 
 use std::collections::BTreeSet;
 use std::num::NonZeroUsize;
 
-use super::{ImagePipeline, one_frame_each};
+use super::{ImagePipeline, has_frames_for_all_workers};
 use crate::ask::ImageLimit;
 use crate::error::Result;
-use crate::images::enhancement::{darkened, evenly};
+use crate::images::enhancement::{dark_or_darkened, evenly_spaced_indices};
 use crate::images::frame_work::FrameWork;
-use crate::images::frames::{Source, SourceFrame};
+use crate::images::frames::Source;
 use crate::images::stored::Needed;
 use crate::images::trials::SourcePlan;
 use crate::images::workers::Workers;
@@ -19,20 +19,19 @@ use darkqa_enhance::{Enhancer, FRAMES, sets_in_memory};
 const LARGE_IMAGE: usize = 5_000_000;
 
 impl ImagePipeline<'_> {
-    /// Makes a few images before anything is paid for, to find errors that would stop a run later. These are the first image of each
-    /// enhancer and, if an endpoint is asked, those of the largest frame without an enhancer. Warns if these are large and the limit
-    /// of the endpoint is unknown.
+    /// Makes a few images before anything is paid for, to find errors that would stop a run later: the first image of each enhancer and,
+    /// for an endpoint, the images of the largest frame without an enhancer. Warns if these are large and the endpoint's limit is unknown.
     pub(crate) fn check<I>(&mut self, sources: &[Source], plan: &[SourcePlan<I>]) -> Result<()> {
         self.try_enhancers(sources, plan)?;
-        // What was tried is not counted among the images of the run.
+        // Test images do not count as images of the run.
         self.enhancers.iter_mut().for_each(Enhancer::count_anew);
         if let Some(limit) = self.steps.limit {
-            warn_of_large(self.largest(sources, plan)?.as_ref(), limit);
+            warn_about_large_images(self.check_largest_image(sources, plan)?.as_ref(), limit);
         }
         Ok(())
     }
 
-    /// Makes the first image of each enhancer that is open, so that a broken one is found before anything is asked.
+    /// Makes the first image of each open enhancer, so that a broken one is found before anything is asked.
     fn try_enhancers<I>(&mut self, sources: &[Source], plan: &[SourcePlan<I>]) -> Result<()> {
         let mut tried = BTreeSet::new();
         for part in plan {
@@ -42,11 +41,11 @@ impl ImagePipeline<'_> {
             };
             for condition in part.conditions() {
                 if let Some(name) = &condition.enhancer
-                    && self.resting(name).is_none()
+                    && self.lazy_enhancer(name).is_none()
                     && tried.insert(name)
                 {
                     let steps = self.steps.without_store();
-                    let mut work = FrameWork::planned(steps, source, frame);
+                    let mut work = FrameWork::for_source(steps, source, frame);
                     self.image(&mut work, condition, Needed::Image)?;
                 }
             }
@@ -54,29 +53,35 @@ impl ImagePipeline<'_> {
         Ok(())
     }
 
-    /// Tries each enhancer without a plan, on a few frames of these sources, darkened where they are not dark.
+    /// Probes each enhancer without a plan, on a few frames of these sources; bright frames are darkened first.
     pub(crate) fn probe_sources(&mut self, sources: &[Source]) -> Result<()> {
         if self.enhancers.is_empty() {
             return Ok(());
         }
         let mut frames: Vec<Rgb> = Vec::new();
-        for place in evenly(sources.len(), FRAMES) {
-            let source = &sources[place];
+        for index in evenly_spaced_indices(sources.len(), FRAMES) {
+            let source = &sources[index];
             if let Some(frame) = source.middle() {
-                let mut work = FrameWork::planned(self.steps, source, frame);
+                let mut work = FrameWork::for_source(self.steps, source, frame);
                 frames.push(Rgb::clone(work.clean()?));
             }
         }
-        let dark = darkened(&frames);
-        for enhancer in self.enhancers.iter_mut().filter(|_| !dark.is_empty()) {
+        let dark = dark_or_darkened(&frames);
+        if dark.is_empty() {
+            return Ok(());
+        }
+        for enhancer in &mut self.enhancers {
             enhancer.probe(&dark, self.implausible)?;
         }
         Ok(())
     }
 
-    /// The largest image of the frame with the most pixels, in the conditions without an enhancer. An image that is too large for
-    /// the endpoint is found before anything is paid for.
-    pub(crate) fn largest<I>(
+    /// Checks that the endpoint accepts the images of the frame with the most pixels in the conditions without an enhancer, and returns the
+    /// facts of the largest one; `None` without frames.
+    ///
+    /// # Errors
+    /// If an image cannot be made, or is too large for the endpoint.
+    pub(crate) fn check_largest_image<I>(
         &mut self,
         sources: &[Source],
         plan: &[SourcePlan<I>],
@@ -92,11 +97,12 @@ impl ImagePipeline<'_> {
                 .map(|part| sources[part.source].order.len());
             limit.check_request(shown.max().unwrap_or(0), None)?;
         }
-        let pixels = |frame: &SourceFrame| u64::from(frame.size.0) * u64::from(frame.size.1);
-        let Some((part, source, frame)) = frames.max_by_key(|(.., frame)| pixels(frame)) else {
+        let Some((part, source, frame)) =
+            frames.max_by_key(|(.., frame)| u64::from(frame.size.0) * u64::from(frame.size.1))
+        else {
             return Ok(None);
         };
-        let mut work = FrameWork::planned(self.steps.without_store(), source, frame);
+        let mut work = FrameWork::for_source(self.steps.without_store(), source, frame);
         let mut largest: Option<ImageFacts> = None;
         for condition in part
             .conditions()
@@ -123,20 +129,20 @@ impl ImagePipeline<'_> {
         Ok(largest)
     }
 
-    /// Opens the enhancers once more for each worker, so that several images are enhanced at the same time: if there are enough frames
-    /// and the memory suffices. Measured with two workers of one thread against one of two threads: 0.86 of the CPU time with
-    /// Zero-DCE, 0.59 with RUAS.
+    /// Opens a set of enhancers for each worker, so that several images are enhanced at the same time, if there are enough frames and
+    /// memory. Measured CPU time of two workers with one thread each, relative to one worker with two threads: 0.86 for Zero-DCE, 0.59 for
+    /// RUAS.
     ///
     /// # Errors
     /// If a session cannot be opened.
-    pub(crate) fn open_sets<I>(
+    pub(crate) fn open_enhancer_sets<I>(
         &mut self,
         sources: &[Source],
         plan: &[SourcePlan<I>],
         workers: &Workers,
     ) -> Result<()> {
-        let cores = workers.each.len();
-        if self.enhancers.is_empty() || !one_frame_each(sources, plan, cores) {
+        let cores = workers.single_threaded.len();
+        if self.enhancers.is_empty() || !has_frames_for_all_workers(sources, plan, cores) {
             return Ok(());
         }
         let count = sets_in_memory(cores);
@@ -144,20 +150,21 @@ impl ImagePipeline<'_> {
             return Ok(());
         }
         let threads = NonZeroUsize::new(cores / count).unwrap_or(NonZeroUsize::MIN);
-        let sets = (1..=count).map(|number| {
-            self.enhancers
-                .iter()
-                .map(|enhancer| enhancer.twin(number, threads))
-                .collect()
-        });
-        self.sets = sets.collect::<Result<_>>()?;
+        self.enhancer_sets = (1..=count)
+            .map(|number| {
+                self.enhancers
+                    .iter()
+                    .map(|enhancer| enhancer.twin(number, threads))
+                    .collect()
+            })
+            .collect::<Result<_>>()?;
         self.enhancers.clear();
         Ok(())
     }
 }
 
 /// Warns if images are large and the limit of the endpoint is unknown.
-fn warn_of_large(largest: Option<&ImageFacts>, limit: ImageLimit) {
+fn warn_about_large_images(largest: Option<&ImageFacts>, limit: ImageLimit) {
     if let Some(image) = largest
         && image.bytes > LARGE_IMAGE
         && limit == ImageLimit::UNKNOWN

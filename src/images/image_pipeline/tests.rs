@@ -25,10 +25,11 @@ fn frame() -> (tempfile::TempDir, Dataset, Source) {
     (folder, dataset, source)
 }
 
-/// The image and the wanted notes about the frame, and whether its file was decoded.
+/// The image and the wanted notes of the frame, and whether its file was decoded. `max_side` is in pixels.
 fn pipeline_output(
     condition: &str,
-    (format, max_side): (&str, Option<u32>),
+    format: &str,
+    max_side: Option<u32>,
     thumbnail: bool,
 ) -> (Arc<Payload>, ImageNotes, bool) {
     let (_folder, dataset, source) = frame();
@@ -39,9 +40,9 @@ fn pipeline_output(
         format: format.parse().unwrap(),
         scaling: max_side.map_or(Scaling::Never, Scaling::MaxSide),
         degraded_at: DegradeStage::Native,
-        camera_of: CameraScope::Frame,
+        camera_scope: CameraScope::Frame,
         enhancers: Vec::new(),
-        elsewhere: Vec::new(),
+        enhanced_images: Vec::new(),
     };
     let steps = ImageSteps {
         frames: &dataset,
@@ -51,37 +52,37 @@ fn pipeline_output(
         stored: None,
     };
     let mut pipeline = ImagePipeline::new(steps, Vec::new(), Implausible::default());
-    let mut work = FrameWork::planned(steps, &source, &source.frames[0]);
+    let mut work = FrameWork::for_source(steps, &source, &source.frames[0]);
     let condition = condition.parse().unwrap();
     let wanted = WantedNotes {
         thumbnail,
         fidelity: condition != Condition::L0,
     };
     let (image, notes) = pipeline
-        .image_and_notes(&mut work, &condition, (&source.name, None), wanted)
+        .image_and_notes(&mut work, &condition, &source.name, None, wanted)
         .unwrap();
     (image, notes, work.is_decoded())
 }
 
 #[test]
-fn a_file_that_is_sent_as_it_is_is_decoded_only_for_a_thumbnail() {
-    let (image, notes, decoded) = pipeline_output("L0", ("png", None), false);
+fn an_unchanged_file_is_decoded_only_for_its_thumbnail() {
+    let (image, notes, decoded) = pipeline_output("L0", "png", None, false);
     assert!(notes.thumbnail.is_none() && !decoded);
     let (folder, ..) = frame();
     let file = std::fs::read(folder.path().join("a.png")).unwrap();
     assert_eq!(image.file(), file);
-    let (image, notes, decoded) = pipeline_output("L0", ("png", None), true);
+    let (image, notes, decoded) = pipeline_output("L0", "png", None, true);
     assert!(decoded);
     assert_eq!(notes.thumbnail.unwrap().image, image.facts().digest);
 }
 
 #[test]
-fn thumbnails_show_what_was_sent() {
+fn thumbnails_show_the_sent_image() {
     for condition in ["L0", "L2-ev", "L3-noise"] {
-        for how in [("png", None), ("png", Some(50)), ("jpeg:60", Some(50))] {
-            let (image, notes, _) = pipeline_output(condition, how, true);
+        for (format, max_side) in [("png", None), ("png", Some(50)), ("jpeg:60", Some(50))] {
+            let (image, notes, _) = pipeline_output(condition, format, max_side, true);
             let thumbnail = notes.thumbnail.unwrap();
-            let of_file = crate::images::notes::thumbnail::thumbnail(
+            let from_payload = crate::images::notes::thumbnail::thumbnail(
                 &thumbnail.frame,
                 &thumbnail.condition,
                 &image,
@@ -89,29 +90,29 @@ fn thumbnails_show_what_was_sent() {
                 None,
             )
             .unwrap();
-            assert_eq!(thumbnail, of_file, "{condition} {how:?}");
+            assert_eq!(thumbnail, from_payload, "{condition} {format} {max_side:?}");
         }
     }
 }
 
+/// PSNR of the frame in a condition, in dB.
+fn psnr(condition: &str, max_side: Option<u32>) -> f64 {
+    let (image, notes, _) = pipeline_output(condition, "png", max_side, false);
+    let fidelity = notes.fidelity.unwrap();
+    assert_eq!(fidelity.image, image.facts().digest);
+    let ssim = fidelity.ssim.unwrap();
+    assert!(ssim > 0.0 && ssim < 1.0, "{condition}: {ssim}");
+    fidelity.psnr.unwrap()
+}
+
 #[test]
-fn fidelity_compares_what_was_sent_with_the_clean_frame_in_its_size() {
-    let of = |condition, max_side| {
-        let (image, notes, _) = pipeline_output(condition, ("png", max_side), false);
-        (image.facts().clone(), notes.fidelity)
-    };
-    assert_eq!(of("L0", None).1, None);
-    let psnr = |condition, max_side| {
-        let (facts, fidelity) = of(condition, max_side);
-        let fidelity = fidelity.unwrap();
-        assert_eq!(fidelity.image, facts.digest);
-        let ssim = fidelity.ssim.unwrap();
-        assert!(ssim > 0.0 && ssim < 1.0, "{condition}: {ssim}");
-        fidelity.psnr.unwrap()
-    };
+fn fidelity_is_measured_in_the_size_sent() {
+    let (_, notes, _) = pipeline_output("L0", "png", None, false);
+    assert_eq!(notes.fidelity, None);
     assert!(psnr("L1-ev", None) > psnr("L3-ev", None));
-    // The frame is compared in the size sent: 30 pixels are above the window, and the darkness costs about the same.
+    // The frame is compared in the size sent. A side of 30 pixels is larger than the SSIM window, and the PSNR is about the same.
     assert!((psnr("L3-ev", Some(30)) - psnr("L3-ev", None)).abs() < 2.0);
-    // The sides of this image are below the window of the structural similarity.
-    assert_eq!(of("L3-ev", Some(12)).1.unwrap().ssim, None);
+    // The sides of this image are smaller than the SSIM window.
+    let (_, notes, _) = pipeline_output("L3-ev", "png", Some(12), false);
+    assert_eq!(notes.fidelity.unwrap().ssim, None);
 }

@@ -1,4 +1,4 @@
-//! Notes about images that a run stores for the report ([`ImageNotes`]), and those still missing ([`MissingNotes`]).
+//! Notes about images that a run stores for the report ([`ImageNotes`]), and which of them are missing ([`MissingNotes`]).
 
 use std::collections::BTreeSet;
 
@@ -13,7 +13,7 @@ use darkqa_score::answers::record::Detail;
 use darkqa_score::photographs::realism::psnr;
 use darkqa_score::photographs::realism::ssim::ssim;
 
-/// The notes about one image; `None` for what is not wanted or exists already.
+/// The notes about one image; `None` for a note that is not wanted or exists already.
 #[derive(Debug, Default)]
 pub(crate) struct ImageNotes {
     pub(crate) thumbnail: Option<Thumbnail>,
@@ -33,10 +33,11 @@ impl ImageNotes {
     }
 }
 
-/// The notes that a run folder does not have yet; by default none are wanted.
+/// The notes that a run folder does not have yet; by default none.
 #[derive(Debug, Default)]
 pub(crate) struct MissingNotes {
     thumbnails: MissingThumbnails,
+    /// Images whose fidelity is stored already.
     measured: BTreeSet<(Shared<FrameId>, Shared<Condition>)>,
 }
 
@@ -48,34 +49,31 @@ pub(crate) struct WantedNotes {
 }
 
 impl MissingNotes {
-    /// The notes that are missing beside those `measured` already.
+    /// The missing thumbnails, and the fidelity of all images except those `measured` already.
     pub(crate) fn new(thumbnails: MissingThumbnails, measured: Vec<ImageFidelity>) -> Self {
-        let measured = measured.into_iter();
         Self {
             thumbnails,
             measured: measured
+                .into_iter()
                 .map(|image| (image.frame, image.condition))
                 .collect(),
         }
     }
 
-    /// The things of a frame that have crops.
+    /// The objects of a frame that the thumbnail crops.
     pub(crate) fn objects(&self, frame: &FrameId) -> &[PixelBox] {
         self.thumbnails.objects(frame)
     }
 
-    /// The notes that are wanted about a frame in a condition. The clean frame is not compared with itself.
+    /// The notes to make about a frame in a condition. The clean frame is not compared with itself.
     pub(crate) fn wanted(&self, frame: &FrameId, condition: &Condition) -> WantedNotes {
-        let is_measured = || {
-            let image = (Shared::from(frame.clone()), Shared::from(condition.clone()));
-            self.measured.contains(&image)
-        };
-        // An untouched frame may be dark itself, so that it is no reference for its enhanced image; a photograph in the dark need not
-        // be aligned with its frame.
+        // An untouched frame may be dark, so it is no reference for its enhanced image. A photograph in the dark may not be aligned with
+        // its frame.
         let has_reference = condition.degradation().is_some();
+        let image = (Shared::from(frame.clone()), Shared::from(condition.clone()));
         WantedNotes {
             thumbnail: self.thumbnails.lacks(frame, condition),
-            fidelity: has_reference && !is_measured(),
+            fidelity: has_reference && !self.measured.contains(&image),
         }
     }
 }
@@ -84,16 +82,16 @@ impl MissingNotes {
 ///
 /// # Errors
 /// If the sizes differ.
-pub(crate) fn similarity([image, clean]: [&Rgb; 2]) -> Result<Similarity> {
+pub(crate) fn similarity(image: &Rgb, clean: &Rgb) -> Result<Similarity> {
     let psnr = psnr(image, clean)?;
     Ok(Similarity {
         psnr: psnr.is_finite().then_some(psnr),
-        // An error means that the image is smaller than the window.
+        // An error means that the image is smaller than the SSIM window.
         ssim: ssim(image, clean).ok(),
     })
 }
 
-/// The similarity of an image as a run stores it.
+/// The similarity of an image in the form that a run stores.
 pub(crate) fn fidelity(
     frame: &FrameId,
     condition: &Condition,

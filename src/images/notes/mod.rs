@@ -1,4 +1,4 @@
-//! Notes about images for the report: thumbnails and what was made of them.
+//! Notes about images for the report: thumbnails and fidelity.
 
 mod image_notes;
 mod montage;

@@ -1,5 +1,5 @@
-//! Thumbnails of sent images for the report: [`thumbnail`] and [`thumbnail_of_all`] make them, [`MissingThumbnails`] holds those not
-//! made yet.
+//! Thumbnails of sent images for the report: [`thumbnail`] and [`thumbnail_of_all`] make them, [`MissingThumbnails`] lists the missing
+//! ones.
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
@@ -129,7 +129,7 @@ pub(crate) fn thumbnail(
     encoded: Option<&Rgb>,
     shown: Option<ShownObjects<'_>>,
 ) -> Result<Thumbnail> {
-    let image = sent.received(encoded)?;
+    let image = sent.received_pixels(encoded)?;
     let ev = crop_gain(condition, sent);
     Ok(Thumbnail {
         frame: frame.clone(),
@@ -223,7 +223,7 @@ fn jpeg_data_url(image: &Rgb) -> Result<String> {
 fn downscaled(image: &Rgb, max_side: u32) -> Result<Cow<'_, Rgb>> {
     let (height, width) = (image.height(), image.width());
     let scaling = NonZeroU32::new(max_side).map_or(Scaling::Never, Scaling::MaxSide);
-    let (columns, rows) = scaling.size((width as u32, height as u32));
+    let (columns, rows) = scaling.size(width as u32, height as u32);
     if (columns, rows) == (width, height) {
         return Ok(Cow::Borrowed(image));
     }
@@ -280,7 +280,7 @@ mod tests {
     use crate::picture::fit;
 
     #[test]
-    fn a_pixel_of_a_small_copy_is_the_mean_of_those_it_replaces() {
+    fn downscaling_averages_the_replaced_pixels() {
         let mut image = Rgb::black(3, 480);
         for (i, pixel) in image.samples_mut().chunks_exact_mut(3).enumerate() {
             let (row, column) = (i / 480, i % 480);
@@ -289,8 +289,9 @@ mod tests {
         // 240 × 2: the first row replaces one row of the image, the second two.
         let copy = downscaled(&image, COPY_SIDE).unwrap();
         assert_eq!((copy.height(), copy.width()), (2, 240));
-        let at = |row: usize, column: usize| copy.samples()[(row * 240 + column) * 3];
-        assert_eq!([at(0, 0), at(0, 3), at(1, 0)], [2, 3, 17]);
+        let codes =
+            [[0, 0], [0, 3], [1, 0]].map(|[row, column]| copy.samples()[(row * 240 + column) * 3]);
+        assert_eq!(codes, [2, 3, 17]);
         let fits = Rgb::black(2, 240);
         assert!(matches!(
             downscaled(&fits, COPY_SIDE).unwrap(),
@@ -311,21 +312,25 @@ mod tests {
         ] {
             let scaled = fit(&image, NonZeroU32::new(side).unwrap()).unwrap();
             let sent = Payload::encode(&scaled, format.parse().unwrap()).unwrap();
-            let copy = |encoded| thumbnail(&frame, &condition, &sent, encoded, None).unwrap();
-            assert_eq!(copy(Some(&*scaled)), copy(None), "{format} {side}");
+            let [from_pixels, from_file] = [Some(&*scaled), None]
+                .map(|encoded| thumbnail(&frame, &condition, &sent, encoded, None).unwrap());
+            assert_eq!(from_pixels, from_file, "{format} {side}");
         }
     }
 
     #[test]
     fn an_object_crop_is_around_the_object_and_within_the_image() {
         let image = Rgb::black(300, 400);
-        let rect = |object| object_rect(&image, object, [800, 600]);
         // The image has half the size of the frame: a box of 40 × 20 pixels has the smallest crop, one of 100 × 60 has a margin.
-        assert_eq!(rect([200, 200, 280, 240]), [78, 88, 64, 64]);
-        assert_eq!(rect([200, 200, 400, 320]), [60, 80, 140, 140]);
-        // A box at the edge, and one larger than a crop.
-        assert_eq!(rect([760, 560, 800, 600]), [236, 336, 64, 64]);
-        assert_eq!(rect([0, 0, 800, 600]), [70, 120, 160, 160]);
+        // The last two are a box at the edge, and one larger than a crop.
+        for (object, expected) in [
+            ([200, 200, 280, 240], [78, 88, 64, 64]),
+            ([200, 200, 400, 320], [60, 80, 140, 140]),
+            ([760, 560, 800, 600], [236, 336, 64, 64]),
+            ([0, 0, 800, 600], [70, 120, 160, 160]),
+        ] {
+            assert_eq!(object_rect(&image, object, [800, 600]), expected);
+        }
         assert_eq!(
             object_rect(&Rgb::black(40, 50), [0, 0, 5, 5], [50, 40]),
             [0, 0, 40, 50]

@@ -1,16 +1,16 @@
-//! Settings that determine images besides their recipes: [`Maker`].
+//! Software versions and enhancer settings that decide images besides their recipes: [`Maker`].
 
 use serde::Serialize;
 
 use darkqa_enhance::SizeArgs;
 
-/// Settings that determine images besides their recipes: the program, the machine's kind, and how enhancers are run. The number of threads is not
-/// part of it: six models (Zero-DCE, RUAS, SCI, Retinexformer, DarkIR, `lift`) gave the same bytes with 1, 2 and 3.
+/// Program, machine and enhancer settings that decide the bytes of an image besides its recipe. The number of threads is not included: six
+/// models (Zero-DCE, RUAS, SCI, Retinexformer, DarkIR, `lift`) gave the same bytes with 1, 2 and 3 threads.
 #[derive(Debug, Serialize)]
 pub(crate) struct Maker {
     /// Version of this program, because encoders may change with it.
     program: &'static str,
-    /// Processor and operating system, because ONNX Runtime's results may differ between them.
+    /// Processor and operating system, because results of ONNX Runtime may depend on them.
     machine: [&'static str; 2],
     /// Name and version of ONNX Runtime; `None` if no enhancer is open.
     runtime: Option<(String, String)>,

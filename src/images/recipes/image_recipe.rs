@@ -1,4 +1,4 @@
-//! Everything needed to make an image again, as the JSON file beside it holds it: [`ImageRecipe`].
+//! The recipe of an image in its JSON sidecar, from which the image can be made again: [`ImageRecipe`].
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use crate::dataset::Picture;
 use crate::error::{Error, Result};
-use crate::images::stored::{ImageOrigin, Sidecar, differing};
+use crate::images::stored::{ImageOrigin, Sidecar, differing_fields};
 use crate::types::degradations::{Axis, Kind};
 use crate::types::{
     Condition, Degradation, Digest, ExposureFacts, FrameId, InputNote, ReadingName, Rgb,
@@ -22,23 +22,23 @@ use darkqa_light::{
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct ImageRecipe {
     frame: String,
-    /// The digest of the image that this one was made from.
+    /// Digest of the input image.
     source: String,
-    /// Changes that reading the file made besides decoding its codes; no fields without changes.
+    /// Changes that reading the file made besides decoding its codes. Without changes it has no JSON fields.
     #[serde(flatten)]
     read: InputNote,
     condition: Condition,
-    /// The exposure drop in EV.
+    /// Exposure drop, in EV.
     drop: f64,
-    /// The version of the kind of degradation that made the image.
+    /// Version of the code that makes this kind of degradation.
     synthesis: u32,
     sensor: Option<SensorRecord>,
-    /// The camera's exposure; not in the file for kinds that leave it open.
+    /// The camera's exposure; omitted for kinds that do not define it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     exposure: Option<ExposureFacts>,
 }
 
-/// The inputs of the sensor branch; those of automatic exposure are the noise profile `physical` at its own gain.
+/// Inputs of the noise synthesis. For automatic exposure: the noise profile `physical` at the gain that the camera chose.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct SensorRecord {
     seed: u64,
@@ -49,25 +49,30 @@ struct SensorRecord {
     tone: Tone,
     draws: Draws,
     coupling: Coupling,
-    /// The distribution that the state was drawn from.
+    /// Distribution from which the state was drawn.
     model: Value,
     state: CameraState,
 }
 
 impl ImageOrigin for ImageRecipe {
-    // The first schema had no digest of the image.
+    // Version 1 has no digest of the image.
     const SCHEMAS: &'static [&'static str] = &["darkqa.image/2", "darkqa.image/1"];
-    const IS_REPLACED: bool = false;
+    const REPLACES_OTHER_SETTINGS: bool = false;
 
     fn difference(&self, wanted: &Self) -> String {
-        let pair = self.sensor.as_ref().zip(wanted.sensor.as_ref());
-        let settings = pair.map_or_else(Vec::new, |(had, wanted)| had.differences(wanted));
-        let version = (self.synthesis != wanted.synthesis)
-            .then(|| format!("synthesis {}, now {}", self.synthesis, wanted.synthesis));
-        let settings: Vec<String> = version.into_iter().chain(settings).collect();
+        let mut settings = Vec::new();
+        if self.synthesis != wanted.synthesis {
+            settings.push(format!(
+                "synthesis {}, now {}",
+                self.synthesis, wanted.synthesis
+            ));
+        }
+        if let (Some(had), Some(wanted)) = (&self.sensor, &wanted.sensor) {
+            settings.extend(had.differences(wanted));
+        }
         match (self.source == wanted.source, &settings[..]) {
             (true, []) => {
-                let fields = differing(&json!(self), &json!(wanted));
+                let fields = differing_fields(&json!(self), &json!(wanted));
                 format!("made with other settings ({})", fields.join(", "))
             }
             (true, settings) => format!("made with {}", settings.join("; ")),
@@ -78,11 +83,31 @@ impl ImageOrigin for ImageRecipe {
 }
 
 impl SensorRecord {
-    /// The flags that differ, with both values. What follows from others is left out: the state is drawn by the seed, and a noise profile
-    /// stands for its choices.
+    /// The flags that differ, with both values. Derived values are omitted: the state follows from the seed, and the noise options from the
+    /// noise profile.
     fn differences(&self, wanted: &Self) -> Vec<String> {
+        let mut flags = vec![
+            ("--seed", json!(self.seed), json!(wanted.seed)),
+            ("--profile", json!(self.reading), json!(wanted.reading)),
+        ];
+        if self.reading == wanted.reading {
+            flags.extend([
+                (
+                    "--noise amplify",
+                    json!(self.amplify),
+                    json!(wanted.amplify),
+                ),
+                ("--noise tone", json!(self.tone), json!(wanted.tone)),
+                ("--noise draws", json!(self.draws), json!(wanted.draws)),
+                (
+                    "--noise coupling",
+                    json!(self.coupling),
+                    json!(wanted.coupling),
+                ),
+            ]);
+        }
         let mut differences = Vec::new();
-        let mut compare = |flag: &str, had: Value, wanted: Value| {
+        for (flag, had, wanted) in flags {
             if had != wanted {
                 let [had, wanted] = [had, wanted].map(|value| match value {
                     Value::String(text) => text,
@@ -90,22 +115,6 @@ impl SensorRecord {
                 });
                 differences.push(format!("{flag} {had}, now {wanted}"));
             }
-        };
-        compare("--seed", json!(self.seed), json!(wanted.seed));
-        compare("--profile", json!(self.reading), json!(wanted.reading));
-        if self.reading == wanted.reading {
-            compare(
-                "--noise amplify",
-                json!(self.amplify),
-                json!(wanted.amplify),
-            );
-            compare("--noise tone", json!(self.tone), json!(wanted.tone));
-            compare("--noise draws", json!(self.draws), json!(wanted.draws));
-            compare(
-                "--noise coupling",
-                json!(self.coupling),
-                json!(wanted.coupling),
-            );
         }
         if self.model != wanted.model {
             differences.push("another --noise camera, gain, ratio or fixed".to_owned());
@@ -115,11 +124,12 @@ impl SensorRecord {
 }
 
 impl ImageRecipe {
-    /// The recipe of an image of a frame, whose file has this digest and was read so; `how` and `applied` are both `None` for the clean
-    /// frame.
+    /// The recipe of an image of a frame. `source` is the digest of the input file, and `read` how it was read. For the clean frame, `how`
+    /// and `applied` are `None`.
     pub(crate) fn new(
         frame: &FrameId,
-        (source, read): (Digest, InputNote),
+        source: Digest,
+        read: InputNote,
         how: Option<&Degradation>,
         applied: Option<&AppliedDegradation>,
         key: &NoiseKey,
@@ -139,7 +149,7 @@ impl ImageRecipe {
                 draws: synthesis.draws,
                 coupling: synthesis.coupling,
                 model: json!(synthesis.camera),
-                state: synthesis.state_by(key, applied.drop_ev()),
+                state: synthesis.state_after_drop(key, applied.drop_ev()),
             })
         });
         Self {
@@ -158,36 +168,36 @@ impl ImageRecipe {
         FrameId(self.frame.clone())
     }
 
-    /// The name of the image file without its ending.
+    /// The name of the image file without its extension.
     pub(crate) fn name(&self, stem: &str) -> String {
         format!("{stem}_{}", self.condition)
     }
 
-    /// The image of the JSON file at `path`, made again from the same picture.
+    /// Makes the image of the JSON file at `path` again.
     ///
     /// # Errors
-    /// If the picture has other content, or the synthesis of this program has another version.
+    /// If `picture` is not the original input, or this program has another version of the synthesis.
     pub(crate) fn replay(file: &Sidecar<Self>, picture: &Picture, path: &Path) -> Result<Rgb> {
         file.recipe.image(picture, file.program(), path)
     }
 
     fn image(&self, picture: &Picture, program: &str, path: &Path) -> Result<Rgb> {
-        let wrong = |problem: String| Error::data(path.display(), problem);
         let how = self.condition.degradation();
         if self.source != picture.digest().to_string() {
             let problem = "made from another image than INPUT (their contents differ, or the flags by which they are read)";
-            return Err(wrong(problem.to_owned()));
+            return Err(Error::data(path.display(), problem));
         }
         if self.synthesis != version(how) {
-            return Err(wrong(format!(
+            let problem = format_args!(
                 "made by synthesis {} of darkqa-eval {}; this program has synthesis {}",
                 self.synthesis,
                 program,
                 version(how)
-            )));
+            );
+            return Err(Error::data(path.display(), problem));
         }
         let clean = picture.pixels()?;
-        let missing = |what: &str| wrong(format!("{what} is missing"));
+        let missing = |what: &str| Error::data(path.display(), format_args!("{what} is missing"));
         let Some(how) = how else {
             return Ok(Rgb::clone(&clean.codes()));
         };
@@ -196,8 +206,9 @@ impl ImageRecipe {
             return Ok(expose(&clean, severity));
         }
         let exposure = self.exposure.filter(|_| kind.has_motion());
-        let path = exposure.and_then(|exposure| exposure.blur_px.zip(exposure.blur_angle));
-        let streak = match path {
+        let blur_length_and_angle =
+            exposure.and_then(|exposure| exposure.blur_px.zip(exposure.blur_angle));
+        let streak = match blur_length_and_angle {
             Some((length, angle)) => Streak::new(length, angle)?,
             None if kind.has_motion() => return Err(missing("the motion blur")),
             None => Streak::STILL,
@@ -206,8 +217,10 @@ impl ImageRecipe {
         if !kind.has_noise() {
             return Ok(blurred_codes(clean, streak));
         }
-        let sensor = self.sensor.as_ref();
-        let sensor = sensor.ok_or_else(|| missing("the state of the sensor"))?;
+        let sensor = self
+            .sensor
+            .as_ref()
+            .ok_or_else(|| missing("the state of the sensor"))?;
         let drop_ev = match exposure {
             Some(exposure) => exposure.dark.ok_or_else(|| missing("what was left dark"))?,
             None => severity.value(),
@@ -218,8 +231,9 @@ impl ImageRecipe {
             Draws::Fresh => frame.at(severity),
         };
         let blurred = (!streak.is_still()).then(|| blur(clean, streak));
-        let light = blurred.as_ref();
-        let light = light.map_or(clean, |light| clean.with_light(light));
+        let light = blurred
+            .as_ref()
+            .map_or(clean, |light| clean.with_light(light));
         let drops = [drop_ev, sensor.coupling.headroom_ev(drop_ev)];
         Ok(develop_with_state(
             light,
@@ -232,12 +246,12 @@ impl ImageRecipe {
     }
 }
 
-/// The noise profile of files that do not name one.
+/// Default noise profile of files without this field.
 fn paper() -> ReadingName {
     ReadingName::PAPER
 }
 
-/// The version of the branch that makes a degradation. A clean frame has the version of the exposure branch.
+/// Version of the code that makes a degradation; for a clean frame, that of the exposure drop.
 fn version(how: Option<&Degradation>) -> u32 {
     how.map_or(exposure::VERSION, |how| darkqa_light::version(how.kind()))
 }

@@ -1,4 +1,4 @@
-//! The flags that decide the images of a run, as typed. A manifest stores them, and they are parsed again from there (`ImageFlags`).
+//! The flags that decide the images of a run, as typed. A manifest stores them, and [`ImageFlags`] parses them again.
 
 use std::collections::BTreeMap;
 use std::num::NonZeroU32;
@@ -10,17 +10,17 @@ use serde_json::Value;
 
 use crate::dataset::{DataArgs, DecodeArgs, SceneArgs};
 use crate::error::{Error, Result};
-use crate::images::frames::Walk;
+use crate::images::frames::WalkArgs;
 use crate::picture::ImageArgs;
 use crate::types::Decides;
 use crate::types::flags::spelled;
 use darkqa_enhance::{EnhancedFolder, SizeArgs};
 use darkqa_light::{CameraArgs, SensorArgs};
 
-/// The flag that may be given several times, and that a later call replaces as a whole.
+/// The repeatable flag whose values replace those of an earlier call; other repeatable flags add to them.
 const REPLACED: &str = "data";
 
-/// Flags by their long names: a text, a list of texts, or `true` for a switch.
+/// Flag values by long name: a text, a list of texts, or `true` for a switch.
 pub(crate) type ImageWords = BTreeMap<String, Value>;
 
 /// All flags that decide images.
@@ -48,32 +48,34 @@ pub(crate) struct ImageFlags {
     #[arg(long, add = Decides::Pixels)]
     pub(crate) max_side: Option<NonZeroU32>,
     #[command(flatten)]
-    pub(crate) walk: Option<Walk>,
+    pub(crate) walk: Option<WalkArgs>,
 }
 
 impl ImageFlags {
-    /// The flags that a manifest stores.
+    /// Parses the flags that a manifest stores.
     pub(crate) fn read(words: &ImageWords) -> Result<Self, String> {
-        let text = |value: &Value| {
-            let text = value.as_str();
-            text.map_or_else(|| value.to_string(), str::to_owned)
-        };
         let flags = words.iter().flat_map(|(flag, value)| match value {
             Value::Bool(true) => vec![format!("--{flag}")],
             Value::Array(list) => list
                 .iter()
-                .map(text)
-                .map(|text| format!("--{flag}={text}"))
+                .map(|value| format!("--{flag}={}", flag_text(value)))
                 .collect(),
-            value => vec![format!("--{flag}={}", text(value))],
+            value => vec![format!("--{flag}={}", flag_text(value))],
         });
         Self::try_parse_from(flags)
             .map_err(|e| format!("this version cannot read the image flags in its manifest: {e}"))
     }
 }
 
-/// The image flags that were typed in a call. A flag that takes several values is included with its default, since a later call may
-/// add to it.
+/// The text of a flag value: a string without its quotes, other values as JSON.
+fn flag_text(value: &Value) -> String {
+    value
+        .as_str()
+        .map_or_else(|| value.to_string(), str::to_owned)
+}
+
+/// The image flags that were typed in a call. A repeatable flag is included even if only its default is set, because a later call may add
+/// values.
 ///
 /// # Errors
 /// If a value is not valid Unicode, so that a manifest cannot store it.
@@ -83,27 +85,27 @@ pub(crate) fn typed_flags(matches: &ArgMatches) -> Result<ImageWords> {
     for argument in flags.get_arguments() {
         let id = argument.get_id().as_str();
         let (flag, action) = (argument.get_long().unwrap_or(id), argument.get_action());
-        let several = matches!(action, ArgAction::Append) && id != REPLACED;
+        let is_repeatable = matches!(action, ArgAction::Append) && id != REPLACED;
         let source = match matches.try_contains_id(id) {
             Ok(true) => matches.value_source(id),
             _ => None,
         };
-        if source != Some(ValueSource::CommandLine) && !(several && source.is_some()) {
+        if source != Some(ValueSource::CommandLine) && !(is_repeatable && source.is_some()) {
             continue;
         }
-        let texts: Option<Vec<Value>> = matches
+        let mut texts = matches
             .get_raw(id)
             .into_iter()
             .flatten()
             .map(|text| Some(text.to_str()?.into()))
-            .collect();
-        let mut texts = texts.ok_or_else(|| {
-            let problem = "cannot be stored in the manifest: the value is not valid Unicode";
-            Error::usage(spelled(flag), problem)
-        })?;
+            .collect::<Option<Vec<Value>>>()
+            .ok_or_else(|| {
+                let problem = "cannot be stored in the manifest: the value is not valid Unicode";
+                Error::usage(spelled(flag), problem)
+            })?;
         let value = match texts.pop() {
             _ if !action.takes_values() => Value::Bool(true),
-            Some(last) if several || !texts.is_empty() => {
+            Some(last) if is_repeatable || !texts.is_empty() => {
                 Value::Array([texts, vec![last]].concat())
             }
             Some(last) => last,

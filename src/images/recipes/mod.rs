@@ -1,4 +1,4 @@
-//! Recipes: all that decides the pixels of an image.
+//! Recipes: the settings and inputs that decide the pixels of an image.
 
 mod image_maker;
 mod image_recipe;

@@ -1,4 +1,4 @@
-//! The settings that decide the pixels that are sent: [`Recipe`].
+//! The settings that decide the pixels of sent images: [`Recipe`].
 
 use std::collections::BTreeSet;
 use std::num::NonZeroU32;
@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::error::{Error, Result};
 use crate::images::enhancement::{DarkImage, EnhancedImages};
-use crate::images::frames::{CameraScope, DegradeStage, Source, SourceFrame, Walk};
+use crate::images::frames::{CameraScope, DegradeStage, Source, SourceFrame, WalkArgs};
 use crate::images::recipes::image_recipe::ImageRecipe;
 use crate::picture::PayloadFormat;
 use crate::picture::Scaling;
@@ -25,14 +25,14 @@ pub(crate) struct Recipe {
     pub(crate) kinds: KindSettings,
     pub(crate) format: PayloadFormat,
     pub(crate) scaling: Scaling,
-    /// Whether light is reduced before or after scaling.
+    /// When frames are degraded: before or after scaling.
     pub(crate) degraded_at: DegradeStage,
-    /// The frames that share one state of the camera.
-    pub(crate) camera_of: CameraScope,
-    /// Enhancers that are run, with the digests of their files.
+    /// The frames that share one camera state.
+    pub(crate) camera_scope: CameraScope,
+    /// Enhancement models to run, with the digests of their files.
     pub(crate) enhancers: Vec<(EnhancerName, Digest)>,
-    /// Images that were enhanced elsewhere.
-    pub(crate) elsewhere: Vec<EnhancedImages>,
+    /// Images that were enhanced by other programs (`--enhanced`), one entry per folder.
+    pub(crate) enhanced_images: Vec<EnhancedImages>,
 }
 
 impl Recipe {
@@ -51,94 +51,101 @@ impl Recipe {
 
     /// The recipe for PNG images in the size of their frames.
     pub(crate) fn lossless(kinds: &KindSettings, files: &[ModelFile]) -> Self {
-        let enhancers = files.iter();
         Self {
             seed: kinds.sensor.seed,
             kinds: kinds.clone(),
             format: PayloadFormat::Png,
             scaling: Scaling::Never,
             degraded_at: DegradeStage::Native,
-            camera_of: CameraScope::Frame,
-            enhancers: enhancers
+            camera_scope: CameraScope::Frame,
+            enhancers: files
+                .iter()
                 .map(|file| (file.name().clone(), file.digest()))
                 .collect(),
-            elsewhere: Vec::new(),
+            enhanced_images: Vec::new(),
         }
     }
 
-    /// The recipe with the images of folders, too.
+    /// Adds folders of images that were enhanced by other programs.
     ///
     /// # Errors
     /// If a folder cannot be read, or two enhancers have the same name.
-    pub(crate) fn with_elsewhere(self, folders: &[EnhancedFolder]) -> Result<Self> {
+    pub(crate) fn with_enhanced_images(self, folders: &[EnhancedFolder]) -> Result<Self> {
         let models = self.enhancers.iter().map(|(name, _)| name);
-        let elsewhere = EnhancedImages::open_all(folders, models)?;
-        Ok(Self { elsewhere, ..self })
+        Ok(Self {
+            enhanced_images: EnhancedImages::open_all(folders, models)?,
+            ..self
+        })
     }
 
-    /// The names of all enhancers: those that are run, then those of folders.
+    /// The names of all enhancers: first the models to run, then the folders of enhanced images.
     pub(crate) fn enhancer_names(&self) -> Vec<EnhancerName> {
-        let run = self.enhancers.iter().map(|(name, _)| name);
-        let elsewhere = self.elsewhere.iter().map(EnhancedImages::name);
-        run.chain(elsewhere).cloned().collect()
+        let models = self.enhancers.iter().map(|(name, _)| name);
+        let folders = self.enhanced_images.iter().map(EnhancedImages::name);
+        models.chain(folders).cloned().collect()
     }
 
-    /// The images of the enhancer of this name, if they were made elsewhere.
-    pub(crate) fn elsewhere(&self, name: &EnhancerName) -> Option<&EnhancedImages> {
-        self.elsewhere.iter().find(|images| images.name() == name)
+    /// The folder of enhanced images with this name; `None` if the enhancer is a model to run.
+    pub(crate) fn enhanced_images(&self, name: &EnhancerName) -> Option<&EnhancedImages> {
+        self.enhanced_images
+            .iter()
+            .find(|images| images.name() == name)
     }
 
     /// The recipe for frames of walks.
-    pub(crate) fn for_walks(self, walk: &Walk) -> Self {
+    pub(crate) fn for_walks(self, walk: &WalkArgs) -> Self {
         Self {
             scaling: walk.side,
             degraded_at: walk.degraded_at,
-            camera_of: walk.camera,
+            camera_scope: walk.camera,
             ..self
         }
     }
 
-    /// The key that the noise of a frame is drawn from.
-    pub(crate) fn noise(&self, source: &FrameId, frame: &FrameId) -> NoiseKey {
+    /// The key that seeds the noise of a frame.
+    pub(crate) fn noise_key(&self, source: &FrameId, frame: &FrameId) -> NoiseKey {
         let own = NoiseKey::new(self.seed, frame);
-        match self.camera_of {
+        match self.camera_scope {
             CameraScope::Frame => own,
             CameraScope::Episode => own.with_camera_of(&NoiseKey::new(self.seed, source)),
         }
     }
 
-    /// The digest of all that decides the images of a source in a condition, and of nothing else. For example, the seed enters only if
-    /// the degradation is random, so exposure drops have the same digest in runs with different seeds.
+    /// Digest of exactly the settings that decide the images of a source in a condition. For example, the seed is included only if the
+    /// degradation is random, so that exposure drops have the same digest in runs with different seeds.
     ///
     /// # Errors
-    /// If the condition has a reading that the recipe lacks.
-    pub(crate) fn stimulus(&self, source: &Source, condition: &Condition) -> Result<Digest> {
+    /// If the recipe lacks the noise profile of the condition.
+    pub(crate) fn stimulus_digest(&self, source: &Source, condition: &Condition) -> Result<Digest> {
         let images: Vec<ImageKeyFacts<'_>> = source
             .frames
             .iter()
-            .map(|frame| self.facts(&source.name, frame, condition))
+            .map(|frame| self.key_facts(&source.name, frame, condition))
             .collect::<Result<_>>()?;
         let in_order: Vec<&ImageKeyFacts<'_>> =
             source.order.iter().map(|index| &images[*index]).collect();
         Digest::canonical("darkqa.images/2", &in_order)
     }
 
-    /// All that decides the image of a frame in a condition.
+    /// The facts that decide the image of a frame in a condition.
     ///
     /// # Errors
-    /// If the condition has a reading that the recipe lacks.
-    pub(crate) fn facts<'a>(
+    /// If the recipe lacks the noise profile of the condition.
+    pub(crate) fn key_facts<'a>(
         &'a self,
         source: &'a FrameId,
         frame: &'a SourceFrame,
         condition: &Condition,
     ) -> Result<ImageKeyFacts<'a>> {
-        let how = frame.degradation(condition)?;
-        let degradation = how.map(|how| self.degradation(source, frame, &how));
-        let enhancer = condition.enhancer.as_ref();
-        let enhancer = enhancer.map(|name| self.enhancer_facts(name, frame, condition));
+        let degradation = frame
+            .degradation(condition)?
+            .map(|how| self.degradation_facts(source, frame, &how));
+        let enhancer = condition
+            .enhancer
+            .as_ref()
+            .map(|name| self.enhancer_facts(name, frame, condition));
         Ok(ImageKeyFacts {
-            picture: frame.picture(condition)?,
+            picture: frame.picture_digest(condition)?,
             degradation: degradation.transpose()?,
             enhancer: enhancer.transpose()?.flatten(),
             format: self.format.to_string(),
@@ -147,16 +154,16 @@ impl Recipe {
         })
     }
 
-    /// All that an enhancer decides of the image of a frame; `None` if the recipe lacks it.
+    /// The facts about an enhancer that decide its image of a frame; `None` if the recipe does not have the enhancer.
     fn enhancer_facts(
         &self,
         name: &EnhancerName,
         frame: &SourceFrame,
         condition: &Condition,
     ) -> Result<Option<EnhancerFacts>> {
-        if let Some(images) = self.elsewhere(name) {
+        if let Some(images) = self.enhanced_images(name) {
             return Ok(Some(EnhancerFacts {
-                digest: images.digest_of(&frame.id, condition)?,
+                digest: images.image_digest(&frame.id, condition)?,
                 version: None,
             }));
         }
@@ -169,31 +176,30 @@ impl Recipe {
 }
 
 impl Recipe {
-    /// Checks that the camera can make each image, which depends on the sizes of the frames, and that all images that were enhanced
-    /// elsewhere are there.
+    /// Checks that motion blur fits into each frame, and that the folders of enhanced images are complete.
     ///
     /// # Errors
-    /// If a picture would move too far during an exposure; names the frame. If images of a folder cannot be used; names them.
+    /// If a frame would move too far during its exposure, or images of a folder cannot be used.
     pub(crate) fn check(&self, sources: &[Source], conditions: &[Condition]) -> Result<()> {
         for source in sources {
             for frame in &source.frames {
                 let how = conditions
                     .iter()
-                    .filter(|of| frame.can_show(of))
+                    .filter(|condition| frame.can_show(condition))
                     .map(|condition| frame.degradation(condition))
                     .collect::<Result<BTreeSet<Option<Degradation>>>>()?;
                 for how in how.iter().flatten().filter(|how| how.kind().has_motion()) {
-                    self.applied(&source.name, frame, how)?;
+                    self.apply(&source.name, frame, how)?;
                 }
             }
         }
-        for images in &self.elsewhere {
+        for images in &self.enhanced_images {
             images.check(&self.dark_images(images.name(), sources, conditions)?)?;
         }
         Ok(())
     }
 
-    /// The dark images that the enhancer of this name gets, as `synthesize` would write them.
+    /// The input images of the enhancer of this name, as `synthesize` would write them.
     fn dark_images<'a>(
         &self,
         name: &EnhancerName,
@@ -208,17 +214,18 @@ impl Recipe {
                 });
                 for condition in enhanced {
                     let how = frame.degradation(condition)?;
-                    let applied = how.as_ref();
-                    let applied = applied.map(|how| self.applied(&source.name, frame, how));
-                    let applied = applied.transpose()?;
-                    let file = (frame.digest, frame.note.clone());
-                    let key = self.noise(&source.name, &frame.id);
+                    let applied = how
+                        .as_ref()
+                        .map(|how| self.apply(&source.name, frame, how))
+                        .transpose()?;
+                    let key = self.noise_key(&source.name, &frame.id);
                     images.push(DarkImage {
                         frame,
                         condition,
                         recipe: ImageRecipe::new(
                             &frame.id,
-                            file,
+                            frame.digest,
+                            frame.note.clone(),
                             how.as_ref(),
                             applied.as_ref(),
                             &key,
@@ -231,49 +238,50 @@ impl Recipe {
         Ok(images)
     }
 
-    fn applied(
+    fn apply(
         &self,
         source: &FrameId,
         frame: &SourceFrame,
         how: &Degradation,
     ) -> Result<AppliedDegradation> {
-        let key = self.noise(source, &frame.id);
+        let key = self.noise_key(source, &frame.id);
         let view = self.view(frame.size, frame.focal);
-        let applied = self.kinds.apply(how, view, &key);
-        applied.map_err(|e| Error::data(format_args!("{} at {how}", frame.id), e))
+        self.kinds
+            .apply(how, view, &key)
+            .map_err(|e| Error::data(format_args!("{} at {how}", frame.id), e))
     }
 
-    fn degradation<'a>(
+    fn degradation_facts<'a>(
         &'a self,
         source: &'a FrameId,
         frame: &'a SourceFrame,
         how: &Degradation,
     ) -> Result<DegradationFacts<'a>> {
         let kind = how.kind();
-        let applied = self.applied(source, frame, how)?;
-        let random = kind.has_noise();
-        let of_source = random && self.camera_of == CameraScope::Episode;
+        let applied = self.apply(source, frame, how)?;
+        let is_random = kind.has_noise();
+        let shares_camera = is_random && self.camera_scope == CameraScope::Episode;
         Ok(DegradationFacts {
             kind,
             severity: how.severity(),
             version: darkqa_light::version(kind),
             reading: applied.synthesis().cloned(),
-            seed: random.then_some(self.seed),
-            frame: random.then_some(&frame.id),
-            camera_of: of_source.then_some(source),
+            seed: is_random.then_some(self.seed),
+            frame: is_random.then_some(&frame.id),
+            camera_of: shares_camera.then_some(source),
             exposure: applied.exposure(),
         })
     }
 
-    /// A frame of this width and height as the camera saw it, in the size in which it is degraded. `focal` is in pixels of the
-    /// frame.
+    /// Width and focal length of a frame of this width and height, in pixels of the size in which it is degraded. `focal` is in pixels of
+    /// the frame.
     pub(crate) fn view(&self, size: (u32, u32), focal: Option<f64>) -> FrameView {
-        let own = size.0 as usize;
+        let native_width = size.0 as usize;
         let width = match self.degraded_at {
-            DegradeStage::Native => own,
-            DegradeStage::Resized => self.scaling.size(size).0,
+            DegradeStage::Native => native_width,
+            DegradeStage::Resized => self.scaling.size(size.0, size.1).0,
         };
-        let scale = width as f64 / own as f64;
+        let scale = width as f64 / native_width as f64;
         FrameView {
             width,
             focal: focal.map(|focal| focal * scale),
@@ -281,7 +289,7 @@ impl Recipe {
     }
 }
 
-/// All that decides an image, as it enters the digest.
+/// The facts that decide an image, as they enter its digest.
 #[derive(Serialize)]
 pub(crate) struct ImageKeyFacts<'a> {
     picture: Digest,
@@ -289,11 +297,11 @@ pub(crate) struct ImageKeyFacts<'a> {
     enhancer: Option<EnhancerFacts>,
     format: String,
     scaling: Scaling,
-    /// `Some(true)` if the frame is scaled before its light is reduced; else `None`.
+    /// `Some(true)` if the frame is scaled before it is degraded; else `None`.
     scaled_before: Option<bool>,
 }
 
-/// All that decides a degraded frame, except the frame's content. Seed and frame are set only if the kind is random.
+/// The facts that decide a degraded frame, except its content. Seed and frame are `None` if the kind is not random.
 #[derive(Serialize)]
 struct DegradationFacts<'a> {
     kind: Kind,
@@ -302,17 +310,17 @@ struct DegradationFacts<'a> {
     reading: Option<Synthesis>,
     seed: Option<u64>,
     frame: Option<&'a FrameId>,
-    /// Source whose frames share one state of the camera; `None` if each frame has its own.
+    /// Source whose frames share one camera state; `None` if each frame has its own.
     camera_of: Option<&'a FrameId>,
-    /// The camera's exposure for this frame: it determines the pixels of kinds with motion blur.
+    /// The camera's exposure of this frame, which decides the motion blur.
     exposure: Option<ExposureFacts>,
 }
 
 #[derive(Serialize)]
 struct EnhancerFacts {
-    /// Digest of the model with its sidecar; of the image itself if it was enhanced elsewhere.
+    /// Digest of the model with its sidecar; for images enhanced by other programs, the digest of the image.
     digest: Digest,
-    /// `None` for images that were enhanced elsewhere.
+    /// `None` for images enhanced by other programs.
     #[serde(skip_serializing_if = "Option::is_none")]
     version: Option<u32>,
 }

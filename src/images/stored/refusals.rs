@@ -1,12 +1,12 @@
-//! Images that were not made because others are in their places: [`Refusals`].
+//! Images that were not made because other images exist in their place: [`Refusals`].
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
-use crate::images::stored::placed_image::Refusal;
+use crate::images::stored::output_image::Refusal;
 
-/// The refused images of a command by reason, from several threads.
+/// The refused images of a command by reason; thread-safe.
 #[derive(Debug, Default)]
 pub(crate) struct Refusals(Mutex<BTreeMap<String, BTreeSet<PathBuf>>>);
 

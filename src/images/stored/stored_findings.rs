@@ -1,4 +1,4 @@
-//! Stored findings about enhancers: that a model was opened, and the result of its probe ([`StoredFindings`]).
+//! Findings about enhancers in the image store: that a model was opened, and the result of its probe ([`StoredFindings`]).
 
 use std::time::Duration;
 
@@ -6,27 +6,27 @@ use serde::Serialize;
 
 use crate::error::Result;
 use crate::image_store::{Content, Entry, EntryFacts, ImageStore, Key, Shown};
-use crate::images::enhancement::enhancers::{Model, OpenEnhancers};
+use crate::images::enhancement::enhancers::{EnhancerModels, Model};
 use crate::images::frames::Source;
 use crate::images::recipes::{ImageKeyFacts, Maker, Recipe};
 use crate::types::{Condition, Digest};
 use darkqa_enhance::{self, Findings};
 
-/// The store, with what decides how enhancers run.
+/// The image store, with the settings that decide how enhancers run.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct StoredFindings<'a> {
     store: &'a ImageStore,
     maker: &'a Maker,
 }
 
-/// All that decides what opening and trying a model finds.
+/// The facts that decide the findings about a model.
 #[derive(Serialize)]
 struct FindingsRecipe<'a> {
-    /// The model, its sidecar and its preset.
+    /// Digest of the model, its sidecar and its preset.
     stated: Digest,
     version: u32,
     maker: &'a Maker,
-    /// Facts that determine the dark frames on which the model is tried, by frame; `None` for the note that it was opened.
+    /// Facts that decide the dark images of the probe, one list per frame; `None` for the entry that the model was opened.
     frames: Option<Vec<Vec<ImageKeyFacts<'a>>>>,
 }
 
@@ -44,11 +44,11 @@ impl<'a> StoredFindings<'a> {
         })
     }
 
-    /// Whether all models of a command were opened and tried before, so that they need not be opened to see whether they can be.
+    /// True if all models of a command were opened and probed before, so they need not be opened to check them.
     ///
     /// # Errors
     /// If a sidecar has a number that is infinite or NaN.
-    pub(crate) fn know_all(self, models: &OpenEnhancers<'_>) -> Result<bool> {
+    pub(crate) fn has_all(self, models: &EnhancerModels<'_>) -> Result<bool> {
         for model in models.models() {
             if !self.store.contains(&self.key(model, None)?) {
                 return Ok(false);
@@ -57,7 +57,7 @@ impl<'a> StoredFindings<'a> {
         Ok(true)
     }
 
-    /// The place of what a model's probe finds on these frames, each of which it may be tried on in these conditions.
+    /// The place of the findings of a model's probe on these frames and conditions.
     ///
     /// # Errors
     /// If a frame cannot be shown in one of its conditions.
@@ -74,7 +74,7 @@ impl<'a> StoredFindings<'a> {
         Ok(FindingsPlace {
             store: self.store,
             opened: self.key(model, None)?,
-            tried: self.key(model, Some(facts))?,
+            probed: self.key(model, Some(facts))?,
             shown: Shown {
                 content: Content::Probe,
                 enhancer: Some(model.name().to_string()),
@@ -84,7 +84,7 @@ impl<'a> StoredFindings<'a> {
     }
 }
 
-/// All that decides the images of the middle frame of a source in these conditions before they are enhanced.
+/// The facts that decide the images of the middle frame of a source in these conditions, before enhancement.
 fn frame_facts<'a>(
     recipe: &'a Recipe,
     source: &'a Source,
@@ -93,23 +93,25 @@ fn frame_facts<'a>(
     let Some(frame) = source.middle() else {
         return Ok(Vec::new());
     };
-    let of = |condition: &Condition| {
-        let light = Condition {
-            enhancer: None,
-            ..condition.clone()
-        };
-        recipe.facts(&source.name, frame, &light)
-    };
-    conditions.iter().map(of).collect()
+    conditions
+        .iter()
+        .map(|condition| {
+            let raw = Condition {
+                enhancer: None,
+                ..condition.clone()
+            };
+            recipe.key_facts(&source.name, frame, &raw)
+        })
+        .collect()
 }
 
-/// The place of what a probe found in a store.
+/// The place of the findings of a probe in the image store.
 #[derive(Debug, Clone)]
 pub(crate) struct FindingsPlace<'a> {
     store: &'a ImageStore,
-    /// Key of the note that the model was opened.
+    /// Key of the entry that the model was opened.
     opened: Key,
-    tried: Key,
+    probed: Key,
     shown: Shown,
 }
 
@@ -117,21 +119,22 @@ impl FindingsPlace<'_> {
     /// The findings; `None` if the store has none.
     pub(crate) fn read(&self) -> Option<Findings> {
         let mut findings: Option<Findings> = None;
-        self.store.get(&self.tried, Content::Probe, |entry| {
+        self.store.get(&self.probed, Content::Probe, |entry| {
             findings = serde_json::from_value(entry.facts.notes.clone()).ok();
             findings.is_some()
         })?;
         findings
     }
 
-    /// Adds what was found, which took this time.
+    /// Writes the findings. `took` is the duration of opening and probing.
     pub(crate) fn write(&self, findings: &Findings, took: Duration) {
-        let entry = |milliseconds, notes| {
-            Entry::from_facts(EntryFacts::new(self.shown.clone(), milliseconds, notes))
-        };
-        let found = entry(took.as_millis() as u64, serde_json::json!(findings));
-        self.store.put(&self.tried, &found);
-        self.store
-            .put(&self.opened, &entry(0, serde_json::Value::Null));
+        let milliseconds = took.as_millis() as u64;
+        for (key, milliseconds, notes) in [
+            (&self.probed, milliseconds, serde_json::json!(findings)),
+            (&self.opened, 0, serde_json::Value::Null),
+        ] {
+            let facts = EntryFacts::new(self.shown.clone(), milliseconds, notes);
+            self.store.put(key, &Entry::from_facts(facts));
+        }
     }
 }

@@ -1,4 +1,4 @@
-//! Small copies of images in the image store: [`ThumbnailPlace`].
+//! Thumbnails in the image store: [`ThumbnailPlace`].
 
 use serde::Serialize;
 
@@ -7,7 +7,7 @@ use crate::images::notes::thumbnail::{self, ShownObjects};
 use crate::types::questions::PixelBox;
 use crate::types::{Condition, Digest, FrameId, Thumbnail};
 
-/// The place of the small copy of an image in a store.
+/// The place of the thumbnail of an image in the store.
 #[derive(Debug)]
 pub(crate) struct ThumbnailPlace<'a> {
     store: &'a ImageStore,
@@ -15,25 +15,27 @@ pub(crate) struct ThumbnailPlace<'a> {
     shown: Shown,
 }
 
-/// All that decides a small copy.
+/// The facts that decide a thumbnail.
 #[derive(Serialize)]
 struct ThumbnailRecipe<'a> {
     content: Content,
     version: u32,
-    /// Digest of all that decides the image.
+    /// Digest of the image's key.
     image: &'a Digest,
     frame: &'a FrameId,
     condition: &'a Condition,
-    /// Width and height in which the boxes of the things are, and these boxes.
+    /// Width and height of the frame, and the boxes of the cropped objects in it.
     objects: Option<([u32; 2], &'a [PixelBox])>,
 }
 
 impl<'a> ThumbnailPlace<'a> {
-    /// The place of the small copy of the image with this key; `None` if there can be none.
+    /// The place of the thumbnail of the image with this key; `None` if no key can be made.
     pub(crate) fn new(
-        (store, image): (&'a ImageStore, &Key),
+        store: &'a ImageStore,
+        image: &Key,
         shown: &Shown,
-        (frame, condition): (&FrameId, &Condition),
+        frame: &FrameId,
+        condition: &Condition,
         objects: Option<ShownObjects<'_>>,
     ) -> Option<Self> {
         let key = Key::from_recipe(&ThumbnailRecipe {
@@ -43,10 +45,11 @@ impl<'a> ThumbnailPlace<'a> {
             frame,
             condition,
             objects: objects.map(|shown| (shown.size, shown.objects)),
-        });
+        })
+        .ok()?;
         Some(Self {
             store,
-            key: key.ok()?,
+            key,
             shown: Shown {
                 content: Content::Thumbnail,
                 ..shown.clone()
@@ -54,19 +57,18 @@ impl<'a> ThumbnailPlace<'a> {
         })
     }
 
-    /// The small copy of the image with this digest; `None` if the store has none.
+    /// Reads the thumbnail of the image with this digest; `None` if the store does not have it.
     pub(crate) fn read(&self, image: Digest) -> Option<Thumbnail> {
-        let mut kept = None;
-        let is_enough = |entry: &Entry| {
+        let mut stored = None;
+        self.store.get(&self.key, Content::Thumbnail, |entry| {
             let read: Option<Thumbnail> = serde_json::from_slice(&entry.image).ok();
-            kept = read.filter(|kept| kept.image == image);
-            kept.is_some()
-        };
-        self.store.get(&self.key, Content::Thumbnail, is_enough)?;
-        kept
+            stored = read.filter(|thumbnail| thumbnail.image == image);
+            stored.is_some()
+        })?;
+        stored
     }
 
-    /// Adds a small copy that took this many milliseconds to make.
+    /// Adds a thumbnail that took this many milliseconds to make.
     pub(crate) fn write(&self, thumbnail: &Thumbnail, milliseconds: u64) {
         let entry = Entry {
             image: serde_json::json!(thumbnail).to_string().into_bytes(),

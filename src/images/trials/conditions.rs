@@ -1,4 +1,4 @@
-//! The conditions in which frames are shown: [`conditions`].
+//! The conditions in which frames are shown, in order: [`conditions`].
 
 use crate::error::{Error, Result};
 use crate::types::{
@@ -7,8 +7,8 @@ use crate::types::{
 use darkqa_enhance::EnhancerArgs;
 use darkqa_light::LightSettings;
 
-/// Every condition in which a frame is shown, level by level, then in the darkness of its photographs: first raw, then with each
-/// enhancer. In this order a frame is degraded once for all enhancers.
+/// All conditions in which a frame is shown: level by level, then its matches and photographs in the dark; each one first raw, then with
+/// every enhancer. In this order a frame is degraded once for all enhancers.
 pub(crate) fn conditions(
     light: &LightSettings,
     photographs: &[PhotoName],
@@ -22,38 +22,34 @@ pub(crate) fn conditions(
     for treatment in degradations.chain(pairs.map(Treatment::Paired)) {
         let is_enhanced = on.has(&treatment);
         let raw = Condition::raw(treatment);
-        let enhanced = |name: &EnhancerName| Condition {
-            enhancer: Some(name.clone()),
-            ..raw.clone()
-        };
-        let enhanced: Vec<Condition> = if is_enhanced {
-            enhancers.iter().map(enhanced).collect()
-        } else {
-            Vec::new()
-        };
-        all.push(raw);
-        all.extend(enhanced);
+        all.push(raw.clone());
+        if is_enhanced {
+            all.extend(enhancers.iter().map(|name| Condition {
+                enhancer: Some(name.clone()),
+                ..raw.clone()
+            }));
+        }
     }
     all
 }
 
-/// Checks that enhancers, if any are named, work on some of the images that are asked about.
+/// Checks that the named enhancers apply to some of the asked images, as far as the flags decide that.
 ///
 /// # Errors
-/// [`Error::Usage`] with the value of `--llie-on` that would use them.
+/// [`Error::Usage`], which suggests the value of `--llie-on` that would use them.
 pub(crate) fn check_used(light: &LightSettings, args: &EnhancerArgs) -> Result<()> {
     let degradations = light.degradations();
-    let treatments = degradations.iter().map(|degradation| {
-        let kind = degradation.as_ref().map(Degradation::kind);
-        TreatmentSet::only(kind)
-    });
-    let Some(asked) = treatments.reduce(TreatmentSet::or) else {
+    let Some(asked) = degradations
+        .iter()
+        .map(|degradation| TreatmentSet::only(degradation.as_ref().map(Degradation::kind)))
+        .reduce(TreatmentSet::or)
+    else {
         return Ok(());
     };
     let on = args.on();
-    // Whether there are photographs in the dark is known when the data are open.
-    let may_be = on.and(TreatmentSet::DARK).is_some() || !light.matches.is_empty();
-    if args.is_empty() || may_be || asked.and(on).is_some() {
+    // Photographs in the dark are known only after the data are opened; `check_enhanced` checks them.
+    let may_enhance_pairs = on.and(TreatmentSet::DARK).is_some() || !light.matches.is_empty();
+    if args.is_empty() || may_enhance_pairs || asked.and(on).is_some() {
         return Ok(());
     }
     let problem = match asked.and(light.variants.into()) {
@@ -68,10 +64,10 @@ pub(crate) fn check_used(light: &LightSettings, args: &EnhancerArgs) -> Result<(
     ))
 }
 
-/// Checks against the conditions of open data what [`check_used`] leaves open.
+/// Checks that the named enhancers are used in the conditions of the opened data, which [`check_used`] does not know.
 ///
 /// # Errors
-/// [`Error::Usage`] if enhancers are named and no condition has one.
+/// [`Error::Usage`] if enhancers are named and no condition uses one.
 pub(crate) fn check_enhanced(conditions: &[Condition], args: &EnhancerArgs) -> Result<()> {
     let is_used = conditions
         .iter()
@@ -111,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn an_enhancer_that_no_condition_uses_is_an_error() {
+    fn an_unused_enhancer_is_an_error() {
         for (words, remedy) in [
             (
                 "--llie lift --levels L0",

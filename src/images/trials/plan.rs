@@ -5,12 +5,18 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::images::trials::trial::Trial;
 use crate::types::{Condition, TrialKey};
 
-/// All trials that share their images, or that have none.
+/// The trials about one source that share their images, or have none.
 #[derive(Debug)]
 pub(crate) struct TrialGroup<I> {
     /// Condition of the images; `None` if only text is sent.
     pub(crate) condition: Option<Condition>,
     pub(crate) trials: Vec<Trial<I>>,
+}
+
+impl<I> TrialGroup<I> {
+    fn is_untouched(&self) -> bool {
+        self.condition == Some(Condition::L0)
+    }
 }
 
 /// All groups about one source.
@@ -29,33 +35,34 @@ impl<I> SourcePlan<I> {
             .filter_map(|group| group.condition.as_ref())
     }
 
-    fn trials(&self) -> usize {
+    fn trial_count(&self) -> usize {
         self.groups.iter().map(|group| group.trials.len()).sum()
     }
 }
 
-/// The trials of one phase of a run, and those of them that have no reply yet.
+/// The trials of one phase of a run, and the ones that remain to be asked.
 #[derive(Debug)]
 pub(crate) struct Plan<I> {
-    /// Every trial, answered or not, source by source.
+    /// Keys of all trials, answered or not, source by source.
     pub(crate) keys: Vec<TrialKey>,
-    /// Numbers of trials, answered or not, by index of their source.
+    /// Number of trials, answered or not, by source index.
     pub(crate) by_source: BTreeMap<usize, usize>,
-    /// Groups of the trials that remain to be asked, in the same order.
+    /// The trials that remain to be asked, in the same order.
     pub(crate) sources: Vec<SourcePlan<I>>,
 }
 
 impl<I> Plan<I> {
-    /// A plan of all these trials, none of them answered.
+    /// A plan in which all trials remain to be asked.
     pub(crate) fn new(sources: Vec<SourcePlan<I>>) -> Self {
-        let trials = sources
+        let keys = sources
             .iter()
             .flat_map(|source| &source.groups)
-            .flat_map(|group| &group.trials);
-        let keys = trials.map(|trial| trial.key).collect();
+            .flat_map(|group| &group.trials)
+            .map(|trial| trial.key)
+            .collect();
         let mut by_source = BTreeMap::new();
         for part in &sources {
-            *by_source.entry(part.source).or_default() += part.trials();
+            *by_source.entry(part.source).or_default() += part.trial_count();
         }
         let mut plan = Self {
             keys,
@@ -79,18 +86,22 @@ impl<I> Plan<I> {
         before - self.remaining()
     }
 
-    /// Adds the images of `all` groups that are wanted and not in the plan, without trials.
+    /// Adds the wanted images of all groups that are not in the plan, without trials.
     pub(crate) fn add_images(
         &mut self,
         all: Vec<SourcePlan<I>>,
         is_wanted: impl Fn(usize, &Condition) -> bool,
     ) {
-        let own = self.sources.iter().map(|part| part.source);
-        let own: BTreeMap<usize, usize> = own.zip(0..).collect();
+        let positions: BTreeMap<usize, usize> = self
+            .sources
+            .iter()
+            .map(|part| part.source)
+            .zip(0..)
+            .collect();
         for SourcePlan { source, groups } in all {
-            let own = own.get(&source).copied();
-            let planned: BTreeSet<Condition> = own
-                .map(|own| self.sources[own].conditions().cloned().collect())
+            let position = positions.get(&source).copied();
+            let planned: BTreeSet<Condition> = position
+                .map(|position| self.sources[position].conditions().cloned().collect())
                 .unwrap_or_default();
             let groups: Vec<TrialGroup<I>> = groups
                 .into_iter()
@@ -101,30 +112,29 @@ impl<I> Plan<I> {
                     trials: Vec::new(),
                 })
                 .collect();
-            match own {
-                Some(own) => self.sources[own].groups.extend(groups),
+            match position {
+                Some(position) => self.sources[position].groups.extend(groups),
                 None if groups.is_empty() => {}
                 None => self.sources.push(SourcePlan { source, groups }),
             }
         }
     }
 
-    /// Moves untouched images to the front, source by source, until they have this many trials; nothing is moved if there are fewer than
-    /// `fewest`. They show whether a server looks at the images at all. Only sources for which `is_cheap` holds are moved, because their
-    /// frames are read twice.
+    /// Moves groups of untouched images to the front until they have at least `trials` trials, because these show whether a server looks at
+    /// the images at all. Nothing is moved if fewer than `min_trials` exist. Only groups of sources for which `is_cheap` is true are moved,
+    /// because the frames of a moved group are read twice.
     pub(crate) fn ask_untouched_first(
         &mut self,
-        fewest: usize,
+        min_trials: usize,
         trials: usize,
         is_cheap: impl Fn(usize) -> bool,
     ) {
-        let is_untouched = |group: &TrialGroup<I>| group.condition == Some(Condition::L0);
         let available: usize = self
             .groups()
-            .filter(|(_, group)| is_untouched(group))
+            .filter(|(_, group)| group.is_untouched())
             .map(|(_, group)| group.trials.len())
             .sum();
-        if available < fewest {
+        if available < min_trials {
             return;
         }
         let mut first = Vec::new();
@@ -132,12 +142,12 @@ impl<I> Plan<I> {
         for part in self.sources.iter_mut().filter(|part| is_cheap(part.source)) {
             if moved < trials
                 && part.groups.len() > 1
-                && let Some(place) = part.groups.iter().position(is_untouched)
+                && let Some(index) = part.groups.iter().position(TrialGroup::is_untouched)
             {
-                moved += part.groups[place].trials.len();
+                moved += part.groups[index].trials.len();
                 first.push(SourcePlan {
                     source: part.source,
-                    groups: vec![part.groups.remove(place)],
+                    groups: vec![part.groups.remove(index)],
                 });
             }
         }
@@ -145,8 +155,8 @@ impl<I> Plan<I> {
         self.sources = first;
     }
 
-    /// Number of trials that remain to be asked and have keys for which `is_counted` holds.
-    pub(crate) fn remaining_of(&self, is_counted: impl Fn(&TrialKey) -> bool) -> usize {
+    /// Number of trials that remain to be asked and whose keys satisfy `is_counted`.
+    pub(crate) fn remaining_where(&self, is_counted: impl Fn(&TrialKey) -> bool) -> usize {
         self.groups()
             .flat_map(|(_, group)| &group.trials)
             .filter(|trial| is_counted(&trial.key))
@@ -155,7 +165,7 @@ impl<I> Plan<I> {
 
     /// Number of trials that remain to be asked.
     pub(crate) fn remaining(&self) -> usize {
-        self.sources.iter().map(SourcePlan::trials).sum()
+        self.sources.iter().map(SourcePlan::trial_count).sum()
     }
 
     /// The conditions of the remaining trials.

@@ -1,4 +1,4 @@
-//! The questions of a data set that are asked: [`select`], [`QuestionBank`]; and the rules that make them: [`rules`].
+//! The questions to ask about a data set: opened or generated ([`open_data`]), selected ([`select`]), or from a bank ([`QuestionBank`]).
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::num::NonZeroUsize;
@@ -13,13 +13,13 @@ use crate::dataset::{
 use crate::error::{Error, Result};
 use crate::files::reading;
 use crate::images::progress::Progress;
-use crate::images::trials::questions_by_rule::by_rule;
+use crate::images::trials::questions_by_rule::generate_by_rule;
 use crate::picture::ReadingRule;
 use crate::text::words::counted;
 use crate::types::{Digest, Family, FrameId, Question};
 use darkqa_questions::rules::Rules;
 
-/// The rulebook in a file; without one, the one built in.
+/// The rulebook in a file; by default the built-in one.
 ///
 /// # Errors
 /// If the file cannot be read, or is not a rulebook.
@@ -30,28 +30,31 @@ pub(crate) fn rules(path: Option<&Path>) -> Result<Rules> {
     Rules::parse(&reading::settings(path)?).map_err(|e| e.at(path.display().to_string()))
 }
 
-/// The opened data. If they have no questions, these are made by rule.
+/// Opens the data at a place. If they have no questions, generates them by rule.
 pub(crate) fn open_data(
-    data: (&DataPlace, &SceneArgs, &SetArgs),
+    place: &DataPlace,
+    scene: &SceneArgs,
+    set: &SetArgs,
     selection: &SelectionArgs,
     rules: &Rules,
     rule: ReadingRule,
     progress: &Progress,
 ) -> Result<Dataset> {
-    let dataset = usable(open_unasked(data, selection, rule)?, data.2.bad, progress)?;
+    let dataset = open_without_generating(place, scene, set, selection, rule)?;
+    let dataset = skip_unusable(dataset, set.bad, progress)?;
     if !dataset.questions().is_empty() {
         return Ok(dataset);
     }
-    let questions = by_rule(&dataset, rules, progress)?;
+    let questions = generate_by_rule(&dataset, rules, progress)?;
     Ok(dataset.with_questions(questions))
 }
 
-/// The same data without images that cannot be read, and without the questions that show one, if `--skip bad` allows it. Each image is
-/// decoded; with its maps if questions are to be made of them.
+/// Removes images that cannot be read, and the questions about them, if `--skip bad` is set. Decodes each image, and also its maps if
+/// questions will be generated.
 ///
 /// # Errors
-/// If more is broken than `--skip bad` allows.
-fn usable(dataset: Dataset, skip: Option<SkipBad>, progress: &Progress) -> Result<Dataset> {
+/// If more images are broken than `--skip bad` allows.
+fn skip_unusable(dataset: Dataset, skip: Option<SkipBad>, progress: &Progress) -> Result<Dataset> {
     let Some(skip) = skip else {
         return Ok(dataset);
     };
@@ -61,22 +64,24 @@ fn usable(dataset: Dataset, skip: Option<SkipBad>, progress: &Progress) -> Resul
     let unusable: BTreeMap<FrameId, String> = shown
         .into_par_iter()
         .filter_map(|frame| {
-            let read = if with_maps {
+            let result = if with_maps {
                 dataset.frame(frame).map(drop)
             } else {
                 dataset.decode_all(frame)
             };
             bar.inc();
-            Some((frame.clone(), read.err()?.to_string()))
+            Some((frame.clone(), result.err()?.to_string()))
         })
         .collect();
     drop(bar);
     dataset.without_unusable(&unusable, skip)
 }
 
-/// The opened data, with the questions that they have themselves. No image is read.
-pub(crate) fn open_unasked(
-    (place, scene, set): (&DataPlace, &SceneArgs, &SetArgs),
+/// Opens the data at a place with their own questions. No image is read.
+pub(crate) fn open_without_generating(
+    place: &DataPlace,
+    scene: &SceneArgs,
+    set: &SetArgs,
     selection: &SelectionArgs,
     rule: ReadingRule,
 ) -> Result<Dataset> {
@@ -84,23 +89,23 @@ pub(crate) fn open_unasked(
     Ok(dataset.with_rule(rule))
 }
 
-/// The field of a run's identity that holds the digest of the questions that are asked about every image.
+/// Field of a run's identity with the digest of the question bank.
 pub(crate) const ASK: &str = "--ask";
 
-/// Questions that are asked about every image, and nobody knows the answers.
+/// Questions that are asked about every image and have no known answers (`--ask`).
 #[derive(Debug)]
 pub(crate) struct QuestionBank {
     place: BankPlace,
     bank: Bank,
-    /// The number of questions about each image; `None` for all.
+    /// Number of questions to ask about each image; `None` for all.
     per_image: Option<NonZeroUsize>,
 }
 
 impl QuestionBank {
-    /// The questions that these flags name; `None` if they name none.
+    /// Opens the questions of `--ask`; `None` without the flag.
     ///
     /// # Errors
-    /// If the file cannot be read, or a line is no such question.
+    /// If the file cannot be read, or a line is not a valid question.
     pub(crate) fn open(args: &BankArgs) -> Result<Option<Self>> {
         let Some(place) = &args.ask else {
             return Ok(None);
@@ -120,27 +125,27 @@ impl QuestionBank {
         self.bank.digest()
     }
 
-    /// The questions in words, for the manifest: their name, and how many are asked about each image.
-    pub(crate) fn words(&self) -> String {
+    /// Description for the manifest: the name of the bank and the number of questions per image.
+    pub(crate) fn description(&self) -> String {
         format!(
             "{}: {} of {} questions about each image",
             self.place,
-            self.each(),
+            self.questions_per_image(),
             self.bank.len()
         )
     }
 
-    /// The number of questions about each image.
-    pub(crate) fn each(&self) -> usize {
-        let most = self.bank.len();
-        self.per_image.map_or(most, |each| each.get().min(most))
+    /// Number of questions asked about each image.
+    pub(crate) fn questions_per_image(&self) -> usize {
+        let all = self.bank.len();
+        self.per_image.map_or(all, |count| count.get().min(all))
     }
 
-    /// The images at a place with the questions about each. What is left aside, and what is asked besides, is said.
+    /// Opens the images at a place, with the questions about each. Prints which files are ignored, and what is asked in addition.
     ///
     /// # Errors
-    /// If there is no image.
-    pub(crate) fn data(
+    /// If the place has no image.
+    pub(crate) fn open_images(
         &self,
         place: &DataPlace,
         set: &SetArgs,
@@ -151,7 +156,7 @@ impl QuestionBank {
         for note in &found.notes {
             progress.note(note);
         }
-        let dataset = usable(found.dataset.with_rule(rule), set.bad, progress)?;
+        let dataset = skip_unusable(found.dataset.with_rule(rule), set.bad, progress)?;
         let questions = self.bank.questions_about(dataset.frames(), self.per_image);
         let images = dataset.frames().count();
         progress.note(&format!(
@@ -159,7 +164,7 @@ impl QuestionBank {
             self.place,
             counted(questions.len(), "question"),
             counted(images, "image"),
-            self.each()
+            self.questions_per_image()
         ));
         if images == 1 {
             tracing::warn!(
@@ -171,7 +176,7 @@ impl QuestionBank {
     }
 }
 
-/// The questions that are asked: the first `--limit` ones of the chosen families.
+/// Selects the first `--limit` questions of the chosen families.
 pub(crate) fn select(
     mut questions: Vec<Question>,
     selection: &SelectionArgs,

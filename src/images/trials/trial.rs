@@ -1,4 +1,4 @@
-//! One request: a [`Trial`] of an [`Item`], about a [`Stimulus`].
+//! One request to a model: a [`Trial`] of an [`Item`] (the question), with a [`Stimulus`] (its images).
 
 use std::sync::Arc;
 
@@ -9,24 +9,24 @@ use crate::picture::Payload;
 use crate::types::{Condition, Record, TrialKey};
 use darkqa_score::answers::record::Detail;
 
-/// The subject of a trial: a question with choices, an open question, or an answer to judge.
+/// Subject of a trial: a question with choices, an open question, or an answer to judge.
 pub(crate) trait Item: Clone + Send + Sync + 'static {
-    /// The fields that it adds to a record.
+    /// Fields that this kind of item adds to a record.
     type Detail: Detail;
 
-    /// Expected tokens of a reply.
+    /// Expected number of tokens in a reply.
     fn reply_tokens(&self) -> f64;
 
     /// The question, in the form for built-in models.
     fn query(&self) -> Query<'_>;
 
-    /// Name of the frame or walk of its images. If a server refuses only requests about one source, that source may be the cause.
+    /// Name of the source of its images. If a server refuses only requests about one source, that source may be the cause.
     fn source(&self) -> &str;
 
-    /// Number of earlier trials with the same question.
+    /// Number of earlier trials of the same question (repeats), from 0.
     fn turn(&self) -> u32;
 
-    /// The record of a trial for a model, without an outcome.
+    /// The record of a trial before its outcome is known.
     fn blank(trial: &Trial<Self>, stimulus: &Stimulus, model: &str) -> Record<Self::Detail>;
 }
 
@@ -46,8 +46,8 @@ pub(crate) struct Prompt {
     /// Text before the images.
     pub(crate) before: Arc<str>,
     /// Text after the images; `None` if there is none.
-    pub(crate) behind: Option<Arc<str>>,
-    /// Where the images stand.
+    pub(crate) after: Option<Arc<str>>,
+    /// Where the images are placed in the text.
     pub(crate) places: ImagePlaces,
 }
 
@@ -56,16 +56,16 @@ impl Prompt {
     pub(crate) fn from_text(text: Arc<str>) -> Self {
         Self {
             before: text,
-            behind: None,
+            after: None,
             places: ImagePlaces::Together,
         }
     }
 
     /// A prompt whose whole text is after the images.
-    pub(crate) fn behind(text: Arc<str>) -> Self {
+    pub(crate) fn after_images(text: Arc<str>) -> Self {
         Self {
             before: Arc::from(""),
-            behind: Some(text),
+            after: Some(text),
             places: ImagePlaces::Together,
         }
     }
@@ -77,15 +77,15 @@ impl Prompt {
 
     /// The text before and after the images; the second is empty if there is none.
     pub(crate) fn parts(&self) -> [&str; 2] {
-        [&self.before, self.behind.as_deref().unwrap_or_default()]
+        [&self.before, self.after.as_deref().unwrap_or_default()]
     }
 
     pub(crate) fn message<'a>(&'a self, images: &'a [Arc<Payload>]) -> Message<'a> {
-        let [before, behind] = self.parts();
+        let [before, after] = self.parts();
         Message {
             before,
             images,
-            after: behind,
+            after,
             places: self.places,
         }
     }
@@ -99,7 +99,7 @@ pub(crate) struct Stimulus {
     pub(crate) images: Vec<Arc<Payload>>,
 }
 
-/// A stimulus with its trials, as the image pipeline hands it out.
+/// A stimulus with its trials, as the image pipeline sends it.
 #[derive(Debug)]
 pub(crate) struct PreparedGroup<I> {
     /// Images of the group; none if one of them could not be made.

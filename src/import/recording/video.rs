@@ -9,7 +9,7 @@ use std::thread::{self, JoinHandle};
 
 use super::Nanoseconds;
 use crate::error::{Error, Result};
-use crate::picture::reading_rule::MOST_PIXELS;
+use crate::picture::reading_rule::MAX_PIXELS;
 use crate::types::Rgb;
 use crate::types::text::excerpt;
 
@@ -281,7 +281,7 @@ impl VideoFrames {
             self.read_number()?,
         );
         let pixels = width.saturating_mul(height);
-        if magic != "P6" || max_value != 255 || pixels == 0 || pixels as u64 > MOST_PIXELS {
+        if magic != "P6" || max_value != 255 || pixels == 0 || pixels as u64 > MAX_PIXELS {
             return Err(format!("an image {magic} of {width} × {height} pixels"));
         }
         let mut samples = vec![0; pixels * 3];

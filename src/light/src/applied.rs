@@ -1,4 +1,4 @@
-//! A degradation with all that decides the pixels of one frame: [`AppliedDegradation`].
+//! A degradation with its parameters for one frame: [`AppliedDegradation`].
 
 use super::auto::{AutoExposure, AutoShot};
 use super::draws::NoiseKey;
@@ -8,43 +8,43 @@ use darkqa_ground::error::Result;
 use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{Degradation, ExposureFacts, ReadingName, Severity};
 
-/// A degradation with all that decides the pixels of one frame, besides the frame itself and the key of its noise.
+/// A degradation with all parameters for one frame. Together with the frame and its noise key, they decide the pixels.
 #[derive(Debug, Clone, PartialEq)]
 pub enum AppliedDegradation {
     /// Less light.
     Exposure(Severity),
     /// Less light, with sensor noise.
     Sensor {
-        /// How much less light.
+        /// Exposure drop.
         severity: Severity,
         /// Name of the noise profile.
         reading: ReadingName,
         /// Content of the noise profile.
         synthesis: Synthesis,
     },
-    /// Less light, as a camera with automatic exposure meets it.
+    /// Less light, with the reaction of automatic exposure.
     Auto {
-        /// The answer of the camera.
+        /// Exposure settings that the camera chose.
         shot: AutoShot,
-        /// The path of the picture during the exposure.
+        /// Path of the image on the sensor during the exposure.
         streak: Streak,
-        /// The sensor: the noise profile `physical` at the gain of the shot.
+        /// Sensor noise: the noise profile `physical` at the gain of the shot.
         synthesis: Synthesis,
     },
     /// The motion blur of an exposure.
     Motion {
         /// Exposure time, in seconds.
         time: f64,
-        /// The path of the picture during the exposure.
+        /// Path of the image on the sensor during the exposure.
         streak: Streak,
     },
 }
 
 impl AppliedDegradation {
-    /// Resolves a degradation for a frame. `synthesis` is the content of its noise profile; a kind without profiles uses only its sensor.
+    /// Resolves a degradation for a frame. `synthesis` is its noise profile; a kind without profiles uses only the sensor of it.
     ///
     /// # Errors
-    /// If the sensor lacks the gain of an automatic exposure, or the picture would move too far.
+    /// If the sensor does not have the gain that automatic exposure needs, or the image would move too far.
     pub fn new(
         how: &Degradation,
         synthesis: &Synthesis,
@@ -98,7 +98,7 @@ impl AppliedDegradation {
         })
     }
 
-    /// The content of the sensor branch; `None` for a kind without noise.
+    /// The settings of the sensor noise; `None` for a kind without noise.
     #[must_use]
     pub fn synthesis(&self) -> Option<&Synthesis> {
         match self {
@@ -107,7 +107,7 @@ impl AppliedDegradation {
         }
     }
 
-    /// The exposure drop in EV after which the sensor's light is shown; 0 for a kind that does not reduce the light.
+    /// The remaining exposure drop of the image, in EV; 0 for a kind that does not darken it.
     #[must_use]
     pub fn drop_ev(&self) -> f64 {
         match self {

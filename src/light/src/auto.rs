@@ -1,9 +1,9 @@
-//! An exposure drop as a camera with automatic exposure meets it: [`AutoExposure`] and its answer, [`AutoShot`].
+//! Reaction of a camera with automatic exposure to an exposure drop: the settings [`AutoExposure`] and the result [`AutoShot`].
 //!
-//! The scene is ΔEV darker. The camera opens its shutter s stops longer, adds g stops of gain, and leaves d = ΔEV − s − g dark. So the
-//! photons fall by 2^−(ΔEV − s), the picture by 2^−d, and the longer exposure blurs it if the camera turns. The sensor adds the noise of
-//! the noise profile `physical` at the drop d, with the gain K = K₀ · 2^g and the ratio r = 2^d. The shot noise of a sample y then has the
-//! relative variance K · r / y = K₀ · 2^(ΔEV − s) / y, however the rest is divided between gain and darkness.
+//! For a scene that is ΔEV darker, the camera exposes s stops longer, adds g stops of gain, and leaves d = ΔEV − s − g uncompensated. The
+//! number of photons falls by 2^−(ΔEV − s), the brightness of the image by 2^−d, and the longer exposure blurs the image if the camera
+//! turns. The noise is that of the noise profile `physical` at the drop d, with the gain K = K₀ · 2^g and the ratio r = 2^d. The relative
+//! variance of the shot noise of a sample y is then K · r / y = K₀ · 2^(ΔEV − s) / y, whatever the split between gain and darkness.
 
 use std::fmt;
 use std::str::FromStr;
@@ -17,13 +17,13 @@ use darkqa_ground::error::{Error, Result};
 use darkqa_ground::types::Severity;
 use darkqa_ground::types::flags::key_values::{number, pairs};
 
-/// How automatic exposure answers less light.
+/// Settings of automatic exposure.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub struct AutoExposure {
-    /// Most stops of longer exposure, in EV.
+    /// Maximum lengthening of the exposure, in EV.
     pub shutter: f64,
-    /// Most stops of gain, in EV.
+    /// Maximum additional gain, in EV.
     pub gain: f64,
     /// System gain K₀ without a drop, in ADU per electron.
     pub base_gain: f64,
@@ -31,10 +31,10 @@ pub struct AutoExposure {
     pub base_time: f64,
 }
 
-/// Most stops of gain by default, where noise reduction would take over; chosen.
-const MOST_GAIN: f64 = 4.0;
+/// Default maximum additional gain, in EV; chosen, because beyond it cameras rely on noise reduction.
+const MAX_GAIN: f64 = 4.0;
 
-/// The settings as the user writes them (`--auto`). Gain settings that are not given follow from the camera.
+/// Settings of the flag `--auto`. Missing gain settings are derived from the camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AutoSettings {
     shutter: f64,
@@ -56,18 +56,19 @@ impl Default for AutoSettings {
 }
 
 impl AutoSettings {
-    /// The settings for a camera. If the gain is not given, it ends at the camera's greatest K, [`MOST_GAIN`] stops above K₀ if the
-    /// camera's range is that large.
+    /// The settings for a camera. By default, the gain reaches the camera's largest K, and K₀ is [`MAX_GAIN`] stops below it, or the
+    /// camera's smallest K if that is larger.
     #[must_use]
     pub fn for_camera(&self, camera: &CameraModel) -> AutoExposure {
         let [low, high] = camera.gain_range();
         let base_gain = self
             .base_gain
-            .unwrap_or_else(|| low.max(high / libm::exp2(MOST_GAIN)));
-        let most = || libm::log2(high / base_gain).clamp(0.0, MOST_GAIN);
+            .unwrap_or_else(|| low.max(high / libm::exp2(MAX_GAIN)));
         AutoExposure {
             shutter: self.shutter,
-            gain: self.gain.unwrap_or_else(most),
+            gain: self
+                .gain
+                .unwrap_or_else(|| libm::log2(high / base_gain).clamp(0.0, MAX_GAIN)),
             base_gain,
             base_time: self.base_time,
         }
@@ -81,14 +82,14 @@ impl Default for AutoExposure {
     }
 }
 
-/// The answer of automatic exposure to one exposure drop.
+/// Exposure that automatic exposure chooses for one exposure drop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AutoShot {
-    /// Stops of longer exposure, in EV.
+    /// Lengthening of the exposure, in EV.
     pub shutter: f64,
-    /// Stops of gain, in EV.
+    /// Additional gain, in EV.
     pub gain: f64,
-    /// Darkness that the exposure does not compensate, in EV.
+    /// Uncompensated rest of the drop, in EV.
     pub dark: f64,
     /// Exposure time, in seconds.
     pub time: f64,
@@ -97,7 +98,7 @@ pub struct AutoShot {
 }
 
 impl AutoExposure {
-    /// The answer to an exposure drop.
+    /// The exposure for an exposure drop.
     #[must_use]
     pub fn shot(&self, drop: Severity) -> AutoShot {
         let drop = drop.value();
@@ -113,27 +114,25 @@ impl AutoExposure {
     }
 }
 
-/// How far K may be outside the range of the camera, as a share: a measured K has an error of 0.1 to 0.2 % (`calibrate`), and who types
-/// it rounds it.
-const GAIN_ERROR: f64 = 2e-3;
+/// Relative tolerance for K outside the camera's range: a measured K has an error of 0.1 to 0.2 % (`calibrate`), and users round it.
+const GAIN_TOLERANCE: f64 = 2e-3;
 
 impl AutoShot {
-    /// The sensor branch for this shot: physical, with the gain K of the shot.
+    /// The noise profile `physical` with the gain K of this shot.
     ///
     /// # Errors
     /// If the camera has no such gain.
     pub fn synthesis(&self, camera: &CameraModel) -> Result<Synthesis> {
         let [low, high] = camera.gain_range();
         let gain = self.system_gain;
-        if gain < low * (1.0 - GAIN_ERROR) || gain > high * (1.0 + GAIN_ERROR) {
-            let rounded = |gain: f64| (gain * 1e4).round() / 1e4;
+        if gain < low * (1.0 - GAIN_TOLERANCE) || gain > high * (1.0 + GAIN_TOLERANCE) {
             let problem = format_args!(
                 "at {} stops of gain, K is {}, but {} has K from {} to {}; set another base-gain or fewer stops of gain",
                 self.gain,
-                rounded(gain),
+                round_to_4_decimals(gain),
                 camera.name(),
-                rounded(low),
-                rounded(high)
+                round_to_4_decimals(low),
+                round_to_4_decimals(high)
             );
             return Err(Error::usage("--auto", problem));
         }
@@ -141,6 +140,10 @@ impl AutoShot {
         camera.pin_gain(gain)?;
         Ok(Synthesis::new(NoiseProfile::Physical, camera))
     }
+}
+
+fn round_to_4_decimals(gain: f64) -> f64 {
+    (gain * 1e4).round() / 1e4
 }
 
 impl FromStr for AutoSettings {
@@ -165,25 +168,24 @@ impl FromStr for AutoSettings {
     }
 }
 
-/// Longest exposure without a drop, in seconds; chosen.
-const LONGEST: f64 = 10.0;
+/// Maximum exposure time without a drop, in seconds; chosen.
+const MAX_BASE_TIME: f64 = 10.0;
 
-/// Reads a time in seconds, as `1/120` or `0.01`.
+/// Parses a time in seconds, such as `1/120` or `0.01`.
 fn seconds(value: &str) -> Result<f64, String> {
-    let number = |text: &str| text.trim().parse::<f64>().ok();
-    let seconds = match value.split_once('/') {
-        None => number(value),
-        Some((above, below)) => number(above)
-            .zip(number(below))
-            .map(|(above, below)| above / below),
-    };
-    seconds.filter(|seconds| *seconds > 0.0 && *seconds <= LONGEST).ok_or_else(|| {
-        format!("base-time={value}: a number of seconds above 0, up to {LONGEST}, expected, as 1/120 or 0.01")
+    let (numerator, denominator) = value.split_once('/').unwrap_or((value, "1"));
+    let numerator: Option<f64> = numerator.trim().parse().ok();
+    let denominator: Option<f64> = denominator.trim().parse().ok();
+    let seconds = numerator
+        .zip(denominator)
+        .map(|(numerator, denominator)| numerator / denominator);
+    seconds.filter(|seconds| *seconds > 0.0 && *seconds <= MAX_BASE_TIME).ok_or_else(|| {
+        format!("base-time={value}: a number of seconds above 0, up to {MAX_BASE_TIME}, expected, as 1/120 or 0.01")
     })
 }
 
 impl fmt::Display for AutoSettings {
-    /// Writes the given settings in the form that is parsed.
+    /// Writes the settings in the form that [`FromStr`] parses.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "shutter={},", self.shutter)?;
         for (key, value) in [("gain", self.gain), ("base-gain", self.base_gain)] {
@@ -203,19 +205,34 @@ impl fmt::Display for AutoSettings {
 
 impl fmt::Display for AutoExposure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let named = AutoSettings {
+        let settings = AutoSettings {
             shutter: self.shutter,
             gain: Some(self.gain),
             base_gain: Some(self.base_gain),
             base_time: self.base_time,
         };
-        named.fmt(f)
+        settings.fmt(f)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn shot(settings: &str, camera: &CameraModel, drop: Severity) -> AutoShot {
+        let settings: AutoSettings = settings.parse().unwrap();
+        settings.for_camera(camera).shot(drop)
+    }
+
+    /// Base gain and maximum gain for a camera, after a check that the camera has the gain of every level.
+    fn gains(settings: &str, camera: &CameraModel) -> (f64, f64) {
+        let settings: AutoSettings = settings.parse().unwrap();
+        let auto = settings.for_camera(camera);
+        for drop in [Severity::L1, Severity::L3, Severity::L5] {
+            auto.shot(drop).synthesis(camera).unwrap();
+        }
+        (auto.base_gain, auto.gain)
+    }
 
     #[test]
     fn shutter_comes_first_then_gain_then_darkness() {
@@ -245,51 +262,50 @@ mod tests {
     #[test]
     fn a_gain_that_the_camera_lacks_is_refused() {
         let camera = CameraModel::default();
-        let settings = |auto: &str| auto.parse::<AutoSettings>().unwrap();
-        let shot = |auto: &str, drop| settings(auto).for_camera(&camera).shot(drop);
-        let most = shot("gain=4", Severity::L3).synthesis(&camera).unwrap();
-        assert_eq!(most.name().as_str(), "physical");
+        let max_gain = shot("gain=4", &camera, Severity::L3)
+            .synthesis(&camera)
+            .unwrap();
+        assert_eq!(max_gain.name().as_str(), "physical");
         for auto in [
             "gain=4.01",
             "gain=4,base-gain=0.38",
             "gain=0,base-gain=0.09",
         ] {
-            let error = shot(auto, Severity::L5).synthesis(&camera).unwrap_err();
-            let error = error.to_string();
+            let error = shot(auto, &camera, Severity::L5)
+                .synthesis(&camera)
+                .unwrap_err()
+                .to_string();
             assert!(
                 error.starts_with("--auto: at ") && error.contains("sony-a7s2 has K from 0.1 to 6"),
                 "{error}"
             );
         }
-        // At L2 only two stops are taken, so that nothing is beyond the camera.
-        shot("gain=5", Severity::L2).synthesis(&camera).unwrap();
+        // At L2 only two stops of gain are used, which the camera has.
+        shot("gain=5", &camera, Severity::L2)
+            .synthesis(&camera)
+            .unwrap();
     }
 
     #[test]
     fn the_gain_follows_from_the_camera() {
-        let of = |auto: &str, camera: &CameraModel| {
-            let settings: AutoSettings = auto.parse().unwrap();
-            let auto = settings.for_camera(camera);
-            // Whatever the camera, no level is refused.
-            for drop in [Severity::L1, Severity::L3, Severity::L5] {
-                auto.shot(drop).synthesis(camera).unwrap();
-            }
-            (auto.base_gain, auto.gain)
-        };
         let nikon = CameraModel::preset("nikon-d850").unwrap();
         let [_, high] = nikon.gain_range();
-        assert_eq!(of("shutter=2", &nikon), (high / 16.0, 4.0));
-        assert_eq!(of("gain=2", &nikon), (high / 16.0, 2.0));
+        assert_eq!(gains("shutter=2", &nikon), (high / 16.0, 4.0));
+        assert_eq!(gains("gain=2", &nikon), (high / 16.0, 2.0));
         let quarter = high / 4.0;
-        assert_eq!(of(&format!("base-gain={quarter}"), &nikon), (quarter, 2.0));
-        // One setting was measured: there is no gain to raise. Its K is typed with the digits of a table.
+        assert_eq!(
+            gains(&format!("base-gain={quarter}"), &nikon),
+            (quarter, 2.0)
+        );
+        // Only one gain was measured, so the gain cannot be raised. Users may type its K rounded.
         let mut own = CameraModel::default();
         own.set_gain_range([0.399_7, 0.399_7]).unwrap();
-        assert_eq!(of("shutter=2", &own), (0.399_7, 0.0));
-        assert_eq!(of("gain=0,base-gain=0.4", &own), (0.4, 0.0));
-        let shot = "gain=0,base-gain=0.401".parse::<AutoSettings>().unwrap();
-        let shot = shot.for_camera(&own).shot(Severity::L1);
-        let error = shot.synthesis(&own).unwrap_err().to_string();
+        assert_eq!(gains("shutter=2", &own), (0.399_7, 0.0));
+        assert_eq!(gains("gain=0,base-gain=0.4", &own), (0.4, 0.0));
+        let error = shot("gain=0,base-gain=0.401", &own, Severity::L1)
+            .synthesis(&own)
+            .unwrap_err()
+            .to_string();
         assert!(
             error.contains("K is 0.401, but sony-a7s2 has K from 0.3997 to 0.3997"),
             "{error}"
@@ -297,22 +313,22 @@ mod tests {
     }
 
     #[test]
-    fn settings_are_written_as_they_are_read() {
+    fn settings_parse_their_own_text() {
         let written = "shutter=2,gain=4,base-gain=0.375,base-time=1/120";
         assert_eq!(AutoExposure::default().to_string(), written);
-        let of_flag = "shutter=2,base-time=1/120";
-        assert_eq!(AutoSettings::default().to_string(), of_flag);
+        let default_flag = "shutter=2,base-time=1/120";
+        assert_eq!(AutoSettings::default().to_string(), default_flag);
         for text in [
             written,
-            of_flag,
+            default_flag,
             "shutter=2,base-gain=1,base-time=1/120",
             "shutter=0,gain=0,base-gain=6,base-time=0.5",
             "shutter=1.5,gain=3,base-gain=0.1,base-time=2.5",
             "shutter=1,gain=1,base-gain=1,base-time=1/3",
         ] {
             let auto: AutoSettings = text.parse().unwrap();
-            let again: AutoSettings = auto.to_string().parse().unwrap();
-            assert_eq!(again, auto, "{text}");
+            let reparsed: AutoSettings = auto.to_string().parse().unwrap();
+            assert_eq!(reparsed, auto, "{text}");
         }
         for (wrong, part) in [
             ("basegain=1", "did you mean base-gain?"),

@@ -1,4 +1,4 @@
-//! Every number that decides an image besides its frame and its noise key: [`CaptureState`], which can be written and replayed.
+//! Serializable state from which a degraded image can be made again: [`CaptureState`].
 
 use darkqa_ground::error::{Error, Result};
 use darkqa_ground::types::images::Isa;
@@ -13,22 +13,22 @@ use super::exposure::{expose, expose_by, expose_to_light};
 use super::movement::Streak;
 use super::movement::blur::{blur, blurred_codes};
 use super::noise_profile::{Amplify, Coupling, Tone};
-use super::raw::negative::{Capture, Target};
+use super::raw::negative::{Capture, OutputSample};
 use super::raw::noise::Term;
 
-/// Every number that decides an image besides its frame and its noise key. The images equal those of [`degrade`](super::degrade).
+/// All parameters that decide an image, except its frame and its noise key. The images equal those of [`degrade`](super::degrade).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CaptureState {
-    /// Exposure drop after which the light is shown, in EV.
+    /// Exposure drop of the image, in EV.
     pub drop_ev: f64,
-    /// Path of the picture during the exposure; of length 0 for kinds without motion.
+    /// Path of the image during the exposure; length 0 for kinds without motion.
     pub streak: Streak,
-    /// The sensor; `None` for kinds without noise.
+    /// State of the sensor; `None` for kinds without noise.
     pub sensor: Option<SensorState>,
 }
 
-/// The sensor of one image.
+/// State of the sensor for one image.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SensorState {
@@ -38,7 +38,7 @@ pub struct SensorState {
     pub tone: Tone,
     /// Quantity that the ratio r depends on.
     pub coupling: Coupling,
-    /// Numbers of the camera.
+    /// Parameters of the camera.
     pub camera: CameraState,
 }
 
@@ -47,7 +47,7 @@ pub struct SensorState {
 pub enum NoiseTerms {
     /// All four terms.
     All,
-    /// None: the image at the same exposure, in the same colours, without noise.
+    /// No terms: the image with the same exposure and colours, without noise.
     None,
 }
 
@@ -61,7 +61,7 @@ impl NoiseTerms {
 }
 
 impl CaptureState {
-    /// The state after a degradation of the frame that `key` belongs to.
+    /// The state for a degradation of the frame that `key` belongs to.
     #[must_use]
     pub fn new(applied: &AppliedDegradation, key: &NoiseKey) -> Self {
         let drop_ev = applied.drop_ev();
@@ -75,7 +75,7 @@ impl CaptureState {
             amplify: synthesis.amplify,
             tone: synthesis.tone,
             coupling: synthesis.coupling,
-            camera: synthesis.state_by(key, drop_ev),
+            camera: synthesis.state_after_drop(key, drop_ev),
         });
         Self {
             drop_ev,
@@ -84,12 +84,12 @@ impl CaptureState {
         }
     }
 
-    /// Refuses numbers with which no image can be made.
+    /// Checks that all parameters are in range.
     ///
     /// # Errors
-    /// [`Error::Data`] with the name of the number and its range.
+    /// [`Error::Data`] with the name of the parameter and its range.
     pub fn check(&self) -> Result<()> {
-        in_range("drop_ev", self.drop_ev, [-16.0, 16.0])?;
+        check_range("drop_ev", self.drop_ev, [-16.0, 16.0])?;
         Streak::new(self.streak.length(), self.streak.angle())?;
         let Some(sensor) = &self.sensor else {
             return Ok(());
@@ -100,11 +100,11 @@ impl CaptureState {
             ("camera_to_rgb", &camera.camera_to_rgb),
         ] {
             for value in matrix.as_flattened() {
-                in_range(name, *value, [-100.0, 100.0])?;
+                check_range(name, *value, [-100.0, 100.0])?;
             }
         }
         for value in camera.bias {
-            in_range("bias", value, [-1e5, 1e5])?;
+            check_range("bias", value, [-1e5, 1e5])?;
         }
         for (name, value, range) in [
             ("rgb_gain", camera.rgb_gain, [0.01, 100.0]),
@@ -117,12 +117,12 @@ impl CaptureState {
             ("row_deviation", camera.row_deviation, [0.0, 1e5]),
             ("adu_range", camera.adu_range, [1.0, 1e6]),
         ] {
-            in_range(name, value, range)?;
+            check_range(name, value, range)?;
         }
         Ok(())
     }
 
-    /// The image of a frame, in 8-bit codes.
+    /// Makes the image of a frame, in 8-bit codes.
     #[must_use]
     pub fn image(&self, clean: Clean<'_>, key: &NoiseKey, noise: NoiseTerms) -> Rgb {
         let Some(sensor) = &self.sensor else {
@@ -137,8 +137,7 @@ impl CaptureState {
         self.capture(sensor, clean, key, noise)
     }
 
-    /// The linear light of the image of a frame, before it is rounded to codes; white is 1. The light L has the code
-    /// ⌊255 · L^(1/2.2) + ½⌋.
+    /// Makes the image of a frame as linear light, before rounding to codes; white is 1. Light L has the code ⌊255 · L^(1/2.2) + ½⌋.
     #[must_use]
     pub fn light(&self, clean: Clean<'_>, key: &NoiseKey, noise: NoiseTerms) -> Light {
         let Some(sensor) = &self.sensor else {
@@ -151,8 +150,8 @@ impl CaptureState {
         self.capture(sensor, clean, key, noise)
     }
 
-    /// The image of a frame behind a sensor.
-    fn capture<T: Target>(
+    /// Makes the image of a frame with sensor noise.
+    fn capture<T: OutputSample>(
         &self,
         sensor: &SensorState,
         clean: Clean<'_>,
@@ -170,19 +169,19 @@ impl CaptureState {
             camera,
         } = sensor;
         let terms = noise.terms();
-        let capture = Capture::with(key, camera, *amplify, *tone, terms, Isa::best());
+        let capture = Capture::from_state(key, camera, *amplify, *tone, terms, Isa::best());
         let headroom_ev = coupling.headroom_ev(self.drop_ev);
         capture.image(exposed, self.drop_ev, headroom_ev)
     }
 }
 
-/// The severity of a drop with two decimals at most, for which the exposure branch has an exact table.
+/// The severity of a drop with at most two decimals, for which the exposure drop has an exact table; `None` for other drops.
 fn exact_severity(drop_ev: f64) -> Option<Severity> {
     let severity = Severity::hundredths((100.0 * drop_ev).round() as u16);
     (severity.value().to_bits() == drop_ev.to_bits()).then_some(severity)
 }
 
-fn in_range(name: &str, value: f64, [low, high]: [f64; 2]) -> Result<()> {
+fn check_range(name: &str, value: f64, [low, high]: [f64; 2]) -> Result<()> {
     if value >= low && value <= high {
         return Ok(());
     }
@@ -235,7 +234,7 @@ mod tests {
     ];
 
     #[test]
-    fn a_state_that_was_written_and_read_makes_the_same_image() {
+    fn a_deserialized_state_makes_the_same_image() {
         for (how, reading) in CASES {
             let applied = applied(how, reading);
             let expected =
@@ -249,9 +248,9 @@ mod tests {
         }
     }
 
-    /// Codes are the light, rounded; light that is halfway between two codes may be rounded either way.
+    /// Codes are the rounded light; light halfway between two codes may be rounded either way.
     #[test]
-    fn light_has_the_codes_of_the_image() {
+    fn light_matches_the_codes_of_the_image() {
         for (how, reading) in CASES {
             let state = CaptureState::new(&applied(how, reading), &key());
             for noise in [NoiseTerms::All, NoiseTerms::None] {
@@ -267,13 +266,18 @@ mod tests {
     }
 
     #[test]
-    fn without_noise_the_key_changes_the_camera_alone() {
+    fn without_noise_the_key_does_not_change_the_image() {
         let state = CaptureState::new(&applied("L2-noise@eld", NoiseProfile::Eld), &key());
         let other = NoiseKey::new(6, &FrameId("b".to_owned()));
-        let image = |key: &NoiseKey, noise| state.image((&picture()).into(), key, noise);
-        let target = image(&key(), NoiseTerms::None);
-        assert_eq!(target, image(&other, NoiseTerms::None));
-        assert_ne!(target, image(&key(), NoiseTerms::All));
+        let picture = picture();
+        let [expected, other, noisy] = [
+            (key(), NoiseTerms::None),
+            (other, NoiseTerms::None),
+            (key(), NoiseTerms::All),
+        ]
+        .map(|(key, noise)| state.image((&picture).into(), &key, noise));
+        assert_eq!(expected, other);
+        assert_ne!(expected, noisy);
     }
 
     #[test]

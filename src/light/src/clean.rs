@@ -1,17 +1,17 @@
-//! The clean frame in any of the forms that images are made from: [`Clean`].
+//! A clean frame in one of four pixel formats: [`Clean`].
 
 use darkqa_ground::types::{Light, Pixels, Rgb, Rgb16Image};
 
-/// A clean frame, in the form in which its pixels are known.
+/// A clean frame, from which degraded images are made.
 #[derive(Debug, Clone, Copy)]
 pub enum Clean<'a> {
     /// 8-bit sRGB codes.
     Codes(&'a Rgb),
     /// 16-bit sRGB codes.
     Rgb16Image(&'a Rgb16Image),
-    /// Light as a display shows it; codes are its power 1/2.2. Above 1 it counts as 1. It is not rounded to codes.
+    /// Linear light of a display, not rounded to codes; a code is 255 · L^(1/2.2). Light above 1 counts as 1.
     Light(&'a Light),
-    /// Light in front of the camera, which no tone curve has changed. It may be more than 1, the light of white.
+    /// Linear light in front of the camera, before any tone curve. White is 1; light may be brighter.
     Scene(&'a Light),
 }
 
@@ -38,7 +38,7 @@ impl Clean<'_> {
 }
 
 impl Clean<'_> {
-    /// Light that was made from this frame, in the same sense: of a scene if the frame is one, else as a display shows it.
+    /// Replaces the pixels by light of the same kind: scene light if this is scene light, else display light.
     #[must_use]
     pub fn with_light(self, light: &Light) -> Clean<'_> {
         match self {

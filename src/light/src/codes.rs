@@ -1,4 +1,4 @@
-//! Conversion between 8-bit codes and the linear light of a display: [`shown_light`] and [`encode`].
+//! Conversion between 8-bit codes and linear display light: [`display_light`] and [`encode`].
 
 use std::sync::LazyLock;
 
@@ -6,13 +6,13 @@ use super::curve;
 use darkqa_ground::types::images::{Isa, Kernel};
 
 /// Linear light of each 8-bit code on a display (DarkQA, eq. 1).
-static SHOWN_LIGHT: LazyLock<[f32; 256]> =
+static DISPLAY_LIGHT: LazyLock<[f32; 256]> =
     LazyLock::new(|| std::array::from_fn(|code| curve::gamma_expand(code as f64 / 255.0) as f32));
 
 /// Returns the linear light of each 8-bit code on a display.
 #[must_use]
-pub(crate) fn shown_light() -> &'static [f32; 256] {
-    &SHOWN_LIGHT
+pub(crate) fn display_light() -> &'static [f32; 256] {
+    &DISPLAY_LIGHT
 }
 
 /// Writes the nearest code of each light, ⌊255 · L^(1/2.2) + ½⌋ (DarkQA, eq. 3). Light above 1 counts as 1.
@@ -86,35 +86,38 @@ impl Kernel for Encode<'_> {
 mod tests {
     use super::*;
 
-    fn encoded(light: &[f32]) -> Vec<u8> {
+    fn encode_all(light: &[f32]) -> Vec<u8> {
         let mut codes = vec![7; light.len()];
         encode(light, &mut codes, Isa::best());
         codes
     }
 
     #[test]
-    fn encode_inverts_shown_light() {
+    fn encode_inverts_display_light() {
         let all: Vec<u8> = (0..=255).collect();
-        assert_eq!(encoded(shown_light()), all);
+        assert_eq!(encode_all(display_light()), all);
     }
 
     /// Checks both sides of every edge between two codes, and a million values in [0, 1].
     #[test]
     fn light_has_the_nearest_code() {
-        let edge = |code: usize| round_up(libm::pow((code as f64 + 0.5) / 255.0, 2.2));
         for code in 0..255 {
-            let light = [edge(code).next_down(), edge(code)];
-            assert_eq!(encoded(&light), [code as u8, code as u8 + 1]);
+            let edge = round_up(libm::pow((code as f64 + 0.5) / 255.0, 2.2));
+            let light = [edge.next_down(), edge];
+            assert_eq!(encode_all(&light), [code as u8, code as u8 + 1]);
         }
         let light: Vec<f32> = (0..=1_000_000_u32)
             .map(|i| (i as f32 / 1e6).powi(3))
             .collect();
-        for (light, code) in light.iter().zip(encoded(&light)) {
+        for (light, code) in light.iter().zip(encode_all(&light)) {
             let expected = 255.0 * libm::pow(f64::from(*light), 1.0 / 2.2) + 0.5;
             let is_edge = (expected - expected.round()).abs() < 1e-9;
             assert!(is_edge || code == expected.floor() as u8, "{light}");
         }
-        assert_eq!(encoded(&[0.0, 1e-30, 1.0, 16.0, -1.0]), [0, 0, 255, 255, 0]);
+        assert_eq!(
+            encode_all(&[0.0, 1e-30, 1.0, 16.0, -1.0]),
+            [0, 0, 255, 255, 0]
+        );
     }
 
     #[test]

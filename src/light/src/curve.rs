@@ -47,9 +47,8 @@ pub fn smoothstep(display: f32) -> f32 {
     display * display * (3.0 - 2.0 * display)
 }
 
-/// The nearest 8-bit code of a display value, which is clamped to [0, 1].
-///
-/// It rounds, because truncation would add a bias of half a code, 7 % of a grey at L5.
+/// The nearest 8-bit code of a display value, which is clamped to [0, 1]. Truncation would add a bias of half a code, 7 % of a grey at
+/// L5.
 #[cfg(test)]
 #[must_use]
 pub fn to_code(display: f64) -> u8 {
@@ -79,7 +78,7 @@ mod tests {
         }
     }
 
-    /// Greys of the sensor branch before the drop, without noise and without a forward tone curve.
+    /// Greys of the sensor branch before the exposure drop, without noise and forward tone curve.
     #[test]
     fn shadows_are_lifted_by_the_inverse_tone_curve() {
         for (code, lifted) in [(0.0, 0.06), (16.0, 38.91), (64.0, 83.41), (192.0, 172.35)] {

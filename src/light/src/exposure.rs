@@ -1,9 +1,9 @@
-//! The exposure branch: less light, without noise.
+//! Exposure drops without noise ("exposure branch").
 
 use rayon::prelude::*;
 
 use super::clean::Clean;
-use super::codes::shown_light;
+use super::codes::display_light;
 use super::curve;
 use darkqa_ground::types::images::{Isa, Kernel};
 use darkqa_ground::types::{Light, Rgb, Rgb16Image, Severity};
@@ -11,19 +11,19 @@ use darkqa_ground::types::{Light, Rgb, Rgb16Image, Severity};
 /// Version of the exposure branch, raised whenever a pixel changes.
 pub const VERSION: u32 = 1;
 
-/// Samples that one thread processes at a time; chosen.
+/// Number of samples that one thread processes at a time; chosen.
 const CHUNK: usize = 1 << 16;
 
 /// 2^23: adding it to a number from 0 to 255 leaves the nearest whole number in the lowest byte.
 const ROUND: f32 = 8_388_608.0;
 
-/// The image after an exposure drop, without noise (DarkQA, eqs. 1–3): each code is looked up in the [`table`]. Codes of 16 bits
-/// and light are rounded to 8 bits after the drop.
+/// Applies an exposure drop without noise (DarkQA, eqs. 1–3). 8-bit codes follow the [`table`]; 16-bit codes and light are rounded to
+/// 8 bits after the drop.
 #[must_use]
 pub fn expose<'a>(clean: impl Into<Clean<'a>>, drop: Severity) -> Rgb {
     match clean.into() {
         Clean::Codes(codes) => expose_codes(codes, drop),
-        deep => expose_by(deep, drop.value()),
+        other => expose_by(other, drop.value()),
     }
 }
 
@@ -38,7 +38,7 @@ fn expose_codes(clean: &Rgb, drop: Severity) -> Rgb {
         factor,
         codes: &mut scaled,
     });
-    // Scaling is faster. For some drops, but not for the paper's, single precision rounds a tie differently.
+    // Scaling is faster, but for some drops (not those of the paper) single precision rounds a tie differently.
     if scaled == table {
         return expose_by(clean, drop.value());
     }
@@ -49,7 +49,7 @@ fn expose_codes(clean: &Rgb, drop: Severity) -> Rgb {
     degraded
 }
 
-/// The image after any exposure drop in EV, without noise; ties between 8-bit codes are rounded as in single precision.
+/// Applies an exposure drop of any number of EV without noise. Ties between 8-bit codes are rounded as in single precision.
 #[must_use]
 pub fn expose_by<'a>(clean: impl Into<Clean<'a>>, drop_ev: f64) -> Rgb {
     let clean = clean.into();
@@ -62,14 +62,15 @@ pub fn expose_by<'a>(clean: impl Into<Clean<'a>>, drop_ev: f64) -> Rgb {
     degraded
 }
 
-/// The codes floor(2^(−ΔEV/2.2) · 255 · v/65535 + ½) of 16-bit codes v, at most 255; ties are rounded up.
+/// Converts 16-bit codes v to floor(2^(−ΔEV/2.2) · 255 · v/65535 + ½), at most 255; ties are rounded up.
 fn expose_16_bits(clean: &Rgb16Image, drop_ev: f64, degraded: &mut Rgb) {
     let factor = 255.0 * curve::display_factor(drop_ev);
-    let code = |code: u16| {
-        let scaled = factor * (f64::from(code) / 65_535.0) + 0.5 + TIE;
-        scaled.floor().min(255.0) as u8
-    };
-    let table: Vec<u8> = (0..=u16::MAX).map(code).collect();
+    let table: Vec<u8> = (0..=u16::MAX)
+        .map(|code| {
+            let scaled = factor * (f64::from(code) / 65_535.0) + 0.5 + TIE;
+            scaled.floor().min(255.0) as u8
+        })
+        .collect();
     let chunks = degraded.samples_mut().par_chunks_mut(CHUNK);
     let clean = clean.samples().par_chunks(CHUNK);
     chunks.zip(clean).for_each(|(codes, clean)| {
@@ -79,9 +80,9 @@ fn expose_16_bits(clean: &Rgb16Image, drop_ev: f64, degraded: &mut Rgb) {
     });
 }
 
-/// The codes floor(255 · min(1, 2^(−ΔEV) · L)^(1/2.2) + ½) of light L, which is clipped after the drop.
+/// Converts light L to the codes floor(255 · min(1, 2^(−ΔEV) · L)^(1/2.2) + ½).
 fn expose_light(clean: &Light, drop_ev: f64, degraded: &mut Rgb) {
-    // The least light of each code above 0: halfway, in codes, from the code below.
+    // Lower limit in light of each code from 1: halfway, in codes, to the code below.
     let drop = libm::exp2(drop_ev);
     let steps: [f64; 255] =
         std::array::from_fn(|below| libm::pow((below as f64 + 0.5) / 255.0, curve::GAMMA) * drop);
@@ -94,30 +95,33 @@ fn expose_light(clean: &Light, drop_ev: f64, degraded: &mut Rgb) {
     });
 }
 
-/// The linear light of the image after any exposure drop in EV, as a display shows it, before it is rounded to codes.
+/// Applies an exposure drop of any number of EV without noise; returns linear display light, not rounded to codes.
 pub(super) fn expose_to_light(clean: Clean<'_>, drop_ev: f64) -> Light {
     let mut degraded = Light::black(clean.height(), clean.width());
     let factor = libm::exp2(-drop_ev);
-    let darker = |light: f64| (light * factor).min(1.0) as f32;
     match clean {
         Clean::Codes(codes) => {
-            let table = shown_light().map(|light| darker(f64::from(light)));
+            let table = display_light().map(|light| darken(f64::from(light), factor));
             for (light, code) in degraded.samples_mut().iter_mut().zip(codes.samples()) {
                 *light = table[usize::from(*code)];
             }
         }
         Clean::Rgb16Image(codes) => {
             for (light, code) in degraded.samples_mut().iter_mut().zip(codes.samples()) {
-                *light = darker(curve::gamma_expand(f64::from(*code) / 65_535.0));
+                *light = darken(curve::gamma_expand(f64::from(*code) / 65_535.0), factor);
             }
         }
         Clean::Light(clean) | Clean::Scene(clean) => {
             for (light, clean) in degraded.samples_mut().iter_mut().zip(clean.samples()) {
-                *light = darker(f64::from(*clean));
+                *light = darken(f64::from(*clean), factor);
             }
         }
     }
     degraded
+}
+
+fn darken(light: f64, factor: f64) -> f32 {
+    (light * factor).min(1.0) as f32
 }
 
 /// Writes the image after an exposure drop into `degraded`, an image of the same size.
@@ -161,9 +165,8 @@ impl Kernel for Scale<'_> {
     }
 }
 
-/// Added before rounding, so that an exact tie is rounded up whatever the last bit of the power is. Exact ties occur at
-/// multiples of 2.2 EV, whose factor is a power of two. Elsewhere the nearest tie is 1.4e-6 away (measured over all 1600
-/// drops).
+/// Offset before rounding, so that exact ties are rounded up despite the rounding error of the power. Exact ties occur at multiples of
+/// 2.2 EV, whose factor is a power of two; elsewhere the nearest tie is 1.4e-6 away (measured over all 1600 drops).
 const TIE: f64 = 1e-9;
 
 /// Code after the drop for each 8-bit code: floor(2^(−ΔEV/2.2) · code + ½); ties are rounded up.
@@ -286,9 +289,9 @@ mod tests {
         assert_eq!(crc32(&all), 0x2f73_04d1);
     }
 
-    /// For the paper's levels, the tables equal the paper's steps done one by one.
+    /// For the levels of the paper, the tables equal the separate steps of the paper.
     #[test]
-    fn the_papers_steps_give_the_papers_tables() {
+    fn tables_equal_the_separate_steps_of_the_paper() {
         for level in Severity::LADDER {
             let factor = curve::light_factor(level.value());
             let by_steps: [u8; 256] = std::array::from_fn(|code| {
@@ -300,7 +303,7 @@ mod tests {
     }
 
     #[test]
-    fn a_higher_level_is_nowhere_brighter() {
+    fn higher_levels_are_never_brighter() {
         for pair in Severity::LADDER.windows(2) {
             let (lower, higher) = (table(pair[0]), table(pair[1]));
             assert!(lower.iter().zip(higher).all(|(low, high)| high <= *low));
@@ -308,7 +311,7 @@ mod tests {
     }
 
     #[test]
-    fn the_page_has_the_codes_of_each_level() {
+    fn the_documentation_has_the_codes_of_each_level() {
         let page = include_str!("../../docs/method.md");
         for (index, case) in (1..).zip(CASES) {
             let [.., white] = case.entries;
@@ -319,7 +322,7 @@ mod tests {
     }
 
     #[test]
-    fn every_sample_goes_through_the_table() {
+    fn every_sample_follows_the_table() {
         let clean = Rgb::new(16, 16, (0..768).map(|i| i as u8).collect()).unwrap();
         for level in Severity::LADDER
             .into_iter()

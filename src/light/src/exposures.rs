@@ -1,4 +1,4 @@
-//! One frame under several degradations: [`Exposures`].
+//! Several degradations of one frame with shared work: [`Exposures`].
 
 use std::collections::BTreeMap;
 
@@ -12,16 +12,16 @@ use super::raw::negative::{Negative, develop_by};
 use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{Light, ReadingName, Rgb};
 
-/// The degraded images of one frame, with a cache of one [`Negative`] for each noise profile, and of the blurred light.
+/// Makes degraded images of one frame. Caches one [`Negative`] per noise profile, and the last blurred frame.
 #[derive(Debug, Default)]
 pub struct Exposures {
     negatives: BTreeMap<ReadingName, Negative>,
-    /// The light of the last path that was asked for: levels with one exposure time share it.
+    /// Blurred light of the last path; levels with equal exposure time share it.
     blurred: Option<(Streak, Light)>,
 }
 
 impl Exposures {
-    /// The frame after a degradation. Frame, key and the contents of the noise profiles must be the same in each call.
+    /// Applies a degradation to the frame. Frame, key and noise profiles must be the same in each call.
     #[must_use]
     pub fn degrade(
         &mut self,
@@ -36,9 +36,10 @@ impl Exposures {
                 reading,
                 synthesis,
             } => {
-                let cached = self.negatives.remove(reading);
-                let negative = cached
-                    .filter(|negative| negative.serves(*severity))
+                let negative = self
+                    .negatives
+                    .remove(reading)
+                    .filter(|negative| negative.can_develop(*severity))
                     .unwrap_or_else(|| Negative::new(clean, key, synthesis, *severity));
                 let degraded = negative.develop(*severity);
                 self.negatives.insert(reading.clone(), negative);
@@ -49,15 +50,15 @@ impl Exposures {
                 streak,
                 synthesis,
             } => {
-                let light = self.exposed(clean, *streak);
+                let light = self.blurred(clean, *streak);
                 develop_by(light, key, synthesis, shot.dark)
             }
             AppliedDegradation::Motion { streak, .. } => blurred_codes(clean, *streak),
         }
     }
 
-    /// The light of an exposure: blurred along a path, or the frame itself if it stands still.
-    fn exposed<'a>(&'a mut self, clean: Clean<'a>, streak: Streak) -> Clean<'a> {
+    /// The frame blurred along a path; unchanged if the path has no length.
+    fn blurred<'a>(&'a mut self, clean: Clean<'a>, streak: Streak) -> Clean<'a> {
         if streak.is_still() {
             return clean;
         }
@@ -76,7 +77,7 @@ pub fn version(kind: Kind) -> u32 {
     match kind {
         Kind::Exposure => super::exposure::VERSION,
         Kind::Sensor => super::VERSION,
-        // The pixels are those of blur and noise.
+        // Both blur and noise change the pixels.
         Kind::Auto => 100 * super::VERSION + blur::VERSION,
         Kind::Motion => blur::VERSION,
     }
@@ -107,8 +108,8 @@ mod tests {
         .unwrap()
     }
 
-    /// A degradation of a frame with these settings.
-    fn applied_by(
+    /// The parameters of a degradation with these settings.
+    fn apply(
         synthesis: &Synthesis,
         how: &str,
         auto: &str,
@@ -125,20 +126,20 @@ mod tests {
         AppliedDegradation::new(&how, synthesis, &auto, &motion, view, &key("a"))
     }
 
-    /// The same by a sensor whose gain and ratio are pinned, which automatic exposure ignores.
+    /// [`apply`] for a sensor with pinned gain and ratio, which automatic exposure ignores.
     fn applied(how: &str, auto: &str, motion: &str) -> AppliedDegradation {
         let mut camera = CameraModel::default();
         camera.pin_gain(3.0).unwrap();
         camera.pin_ratio(7.0).unwrap();
         let synthesis = Synthesis::new(NoiseProfile::Eld, camera);
-        applied_by(&synthesis, how, auto, motion).unwrap()
+        apply(&synthesis, how, auto, motion).unwrap()
     }
 
     fn image(how: &str, auto: &str, motion: &str) -> Rgb {
         Exposures::default().degrade((&picture()).into(), &applied(how, auto, motion), &key("a"))
     }
 
-    /// The noise variant in the noise profile physical, with the gain pinned.
+    /// The noise variant in the noise profile `physical`, with a pinned gain.
     fn physical(severity: Severity, gain: f64) -> Rgb {
         let mut camera = CameraModel::default();
         camera.pin_gain(gain).unwrap();
@@ -146,9 +147,8 @@ mod tests {
         Negative::new(&picture(), &key("a"), &synthesis, severity).develop(severity)
     }
 
-    /// Without shutter, gain and motion, automatic exposure is the physical profile at its gain.
     #[test]
-    fn what_is_met_by_nothing_is_the_physical_reading() {
+    fn without_reaction_and_motion_auto_equals_the_physical_profile() {
         let none = "shutter=0,gain=0,base-gain=1.5";
         for severity in Severity::LADDER {
             let level = Kind::Auto.label(severity);
@@ -166,8 +166,8 @@ mod tests {
         }
     }
 
-    /// At L3 the shutter and the gain meet all of the drop: the picture is as bright as the physical profile without a drop, with
-    /// the noise of the gain K = 0.375 · 2⁴.
+    /// At L3 shutter and gain compensate the whole drop: the image is as bright as without a drop, with the noise of the gain
+    /// K = 0.375 · 2⁴.
     #[test]
     fn gain_brightens_and_keeps_the_noise_of_its_photons() {
         let AppliedDegradation::Auto {
@@ -176,49 +176,58 @@ mod tests {
         else {
             panic!("automatic exposure expected");
         };
-        let state = synthesis.state_by(&key("a"), shot.dark);
+        let state = synthesis.state_after_drop(&key("a"), shot.dark);
         assert!((state.system_gain - 6.0).abs() < 1e-12 && (state.ratio - 1.0).abs() < 1e-12);
         let (bright, dark) = (
             image("L3-auto", "gain=4", "speed=0"),
             physical(Severity::L3, 6.0),
         );
-        let sum =
-            |image: &Rgb| -> u64 { image.samples().iter().map(|code| u64::from(*code)).sum() };
-        assert!(sum(&bright) > 4 * sum(&dark));
+        let [bright, dark] = [bright, dark].map(|image| {
+            image
+                .samples()
+                .iter()
+                .map(|code| u64::from(*code))
+                .sum::<u64>()
+        });
+        assert!(bright > 4 * dark);
     }
 
-    /// The relative variance of the shot noise is K₀ · 2^(ΔEV − s) / y, whatever is gain and whatever is left dark.
+    /// Green samples of an image of 256 × 256 sites.
+    fn green_samples(raw: &Bayer) -> Vec<f64> {
+        (0..256)
+            .flat_map(|row| (0..128).map(move |i| (row, 2 * i + (row + 1) % 2)))
+            .map(|(row, column)| f64::from(raw.sample(row, column)))
+            .collect()
+    }
+
+    fn mean_and_variance(samples: &[f64]) -> (f64, f64) {
+        let n = samples.len() as f64;
+        let mean = samples.iter().sum::<f64>() / n;
+        let squares = samples.iter().map(|sample| (sample - mean).powi(2));
+        (mean, squares.sum::<f64>() / n)
+    }
+
+    /// Variance of the shot noise of a flat grey, relative to the squared signal, times the signal in ADU.
+    fn relative_shot_variance(auto: &str, how: &str) -> f64 {
+        let AppliedDegradation::Auto {
+            shot, synthesis, ..
+        } = applied(how, auto, "speed=0")
+        else {
+            panic!("automatic exposure expected");
+        };
+        let grey = Rgb::new(256, 256, vec![117; 3 * 256 * 256]).unwrap();
+        let state = synthesis.state_after_drop(&key("a"), shot.dark);
+        let mut raw = unprocess(&grey, &state);
+        let (light, _) = mean_and_variance(&green_samples(&raw));
+        add(&mut raw, &state, &key("a"), Amplify::All, &[Term::Shot]);
+        let (mean, variance) = mean_and_variance(&green_samples(&raw));
+        assert!((mean / light - 1.0).abs() < 0.02, "{auto}: {mean} {light}");
+        variance / (light * light) * (light * state.adu_range)
+    }
+
+    /// The relative variance of the shot noise is K₀ · 2^(ΔEV − s) / y, whatever the split between gain and darkness.
     #[test]
     fn shot_noise_follows_the_photons_alone() {
-        let grey = Rgb::new(256, 256, vec![117; 3 * 256 * 256]).unwrap();
-        let greens = |raw: &Bayer| -> Vec<f64> {
-            let sites =
-                (0..256).flat_map(|row| (0..128).map(move |i| (row, 2 * i + (row + 1) % 2)));
-            sites
-                .map(|(row, column)| f64::from(raw.sample(row, column)))
-                .collect()
-        };
-        let moments = |samples: &[f64]| {
-            let n = samples.len() as f64;
-            let mean = samples.iter().sum::<f64>() / n;
-            let squares = samples.iter().map(|sample| (sample - mean).powi(2));
-            (mean, squares.sum::<f64>() / n)
-        };
-        let relative = |auto: &str, how: &str| {
-            let AppliedDegradation::Auto {
-                shot, synthesis, ..
-            } = applied(how, auto, "speed=0")
-            else {
-                panic!("automatic exposure expected");
-            };
-            let state = synthesis.state_by(&key("a"), shot.dark);
-            let mut raw = unprocess(&grey, &state);
-            let (light, _) = moments(&greens(&raw));
-            add(&mut raw, &state, &key("a"), Amplify::All, &[Term::Shot]);
-            let (mean, variance) = moments(&greens(&raw));
-            assert!((mean / light - 1.0).abs() < 0.02, "{auto}: {mean} {light}");
-            variance / (light * light) * (light * state.adu_range)
-        };
         for (auto, how, expected) in [
             ("shutter=2,gain=4", "L3-auto", 0.375 * 16.0),
             ("shutter=2,gain=0", "L3-auto", 0.375 * 16.0),
@@ -227,7 +236,7 @@ mod tests {
             ("shutter=0,gain=3", "L1-auto", 0.375 * 4.0),
             ("shutter=2,gain=4", "L5-auto", 0.375 * 128.0),
         ] {
-            let found = relative(auto, how);
+            let found = relative_shot_variance(auto, how);
             let off = found / expected - 1.0;
             assert!(
                 off.abs() < 0.03,
@@ -236,38 +245,35 @@ mod tests {
         }
     }
 
-    /// Common random numbers: the draws for a frame are the same in every kind, and a random direction moves no other draw.
+    fn camera_state(how: &str, motion: &str) -> CameraState {
+        let applied = applied(how, "gain=4", motion);
+        let synthesis = applied.synthesis().unwrap();
+        synthesis.state_after_drop(&key("a"), applied.drop_ev())
+    }
+
+    /// σ of read and row noise, relative to its median at the same gain.
+    fn fit_scatter(state: &CameraState) -> [f64; 2] {
+        let mut camera = CameraModel::default();
+        camera.set_sampling(crate::Sampling::Fixed);
+        camera.pin_gain(state.system_gain).unwrap();
+        let median = CameraState::draw(&key("a"), &camera);
+        [
+            state.read_scale / median.read_scale,
+            state.row_deviation / median.row_deviation,
+        ]
+    }
+
+    /// Common random numbers: all kinds of degradation share the draws of a frame, and a random direction does not change them.
     #[test]
-    fn draws_are_those_of_the_noise_variant() {
-        let state = |how: &str, motion: &str| -> CameraState {
-            let applied = applied(how, "gain=4", motion);
-            let synthesis = applied.synthesis().unwrap();
-            synthesis.state_by(&key("a"), applied.drop_ev())
-        };
-        let (noise, auto) = (
-            state("L3-noise@eld", "angle=0"),
-            state("L3-auto", "angle=random"),
-        );
+    fn auto_and_noise_share_their_draws() {
+        let noise = camera_state("L3-noise@eld", "angle=0");
+        let auto = camera_state("L3-auto", "angle=random");
         assert_eq!(noise.rgb_to_camera, auto.rgb_to_camera);
-        let gains = |state: &CameraState| {
-            [state.rgb_gain, state.red_gain, state.blue_gain].map(f64::to_bits)
-        };
-        assert_eq!(gains(&noise), gains(&auto));
-        // The scatter of the fits is shared, too: σ over its median at the gain.
-        let fixed = |gain: f64| {
-            let mut camera = CameraModel::default();
-            camera.set_sampling(crate::Sampling::Fixed);
-            camera.pin_gain(gain).unwrap();
-            CameraState::draw(&key("a"), &camera)
-        };
-        let scatter = |state: &CameraState| {
-            let median = fixed(state.system_gain);
-            [
-                state.read_scale / median.read_scale,
-                state.row_deviation / median.row_deviation,
-            ]
-        };
-        for (noise, auto) in scatter(&noise).iter().zip(scatter(&auto)) {
+        let [noise_gains, auto_gains] = [&noise, &auto]
+            .map(|state| [state.rgb_gain, state.red_gain, state.blue_gain].map(f64::to_bits));
+        assert_eq!(noise_gains, auto_gains);
+        // The scatter of the fits is shared, too.
+        for (noise, auto) in fit_scatter(&noise).iter().zip(fit_scatter(&auto)) {
             assert!((noise / auto - 1.0).abs() < 1e-12 && (noise - 1.0).abs() > 1e-3);
         }
         let still = image("L3-auto", "gain=4", "speed=0,angle=0");
@@ -276,18 +282,19 @@ mod tests {
         assert_ne!(moved, image("L3-auto", "gain=4", "angle=0"));
     }
 
-    /// Motion blur alone leaves the light, and what does not move is unchanged.
+    fn mean_light(image: &Rgb) -> f64 {
+        image
+            .samples()
+            .iter()
+            .map(|code| (f64::from(*code) / 255.0).powf(2.2))
+            .sum::<f64>()
+            / image.samples().len() as f64
+    }
+
+    /// Motion blur alone does not change the mean light; without motion, the image is unchanged.
     #[test]
     fn motion_blurs_and_does_not_darken() {
         assert_eq!(image("T33.33-motion", "gain=4", "speed=0"), picture());
-        let mean_light = |image: &Rgb| {
-            image
-                .samples()
-                .iter()
-                .map(|code| (f64::from(*code) / 255.0).powf(2.2))
-                .sum::<f64>()
-                / image.samples().len() as f64
-        };
         let blurred = image("T33.33-motion", "gain=4", "angle=20");
         assert_ne!(blurred, picture());
         assert!((mean_light(&blurred) / mean_light(&picture()) - 1.0).abs() < 0.01);
@@ -299,9 +306,9 @@ mod tests {
         assert!((facts.blur_px.unwrap() - 6.776).abs() < 1e-2);
     }
 
-    /// Levels in any order, with a path that changes between them, are as if each were made alone.
+    /// Images of one instance in any order equal images of separate instances.
     #[test]
-    fn the_cache_changes_nothing() {
+    fn the_cache_does_not_change_images() {
         let mut exposures = Exposures::default();
         for how in [
             "L5-auto",
@@ -317,20 +324,22 @@ mod tests {
         }
     }
 
+    fn apply_error(how: &str, auto: &str, motion: &str) -> String {
+        apply(&Synthesis::default(), how, auto, motion)
+            .unwrap_err()
+            .to_string()
+    }
+
     #[test]
-    fn a_gain_or_a_path_beyond_the_camera_is_refused() {
-        let refused = |how: &str, auto: &str, motion: &str| {
-            let applied = applied_by(&Synthesis::default(), how, auto, motion);
-            applied.unwrap_err().to_string()
-        };
-        let error = refused("L5-auto", "gain=5", "speed=30");
+    fn impossible_gains_and_paths_are_refused() {
+        let error = apply_error("L5-auto", "gain=5", "speed=30");
         assert!(error.contains("K from 0.1 to 6"), "{error}");
-        let error = refused("T133.33-motion", "gain=4", "speed=360");
+        let error = apply_error("T133.33-motion", "gain=4", "speed=360");
         assert!(
             error.contains("325.20 pixels") && error.contains("at most 256"),
             "{error}"
         );
-        let error = refused("L1-auto", "shutter=2", "speed=1200");
+        let error = apply_error("L1-auto", "shutter=2", "speed=1200");
         assert!(error.contains("pixels during the exposure"), "{error}");
     }
 }

@@ -1,32 +1,32 @@
-//! The levels of the kinds of a run: those that are named, or each kind's own ladder.
+//! Levels of a run by kind of degradation: the named levels, or the ladder of each kind.
 
 use super::levels::{LIGHT, Levels, ladder};
-use super::noise_profile::Readings;
+use super::noise_profile::NoiseProfiles;
 use darkqa_ground::error::{Error, Result};
 use darkqa_ground::types::degradations::{Axis, Kind};
 use darkqa_ground::types::{AxisLevel, KindSet, PairDark};
 
 impl Levels {
-    /// The levels of a run with these kinds. Kinds of an axis on which no level is named have their own ladder, if L0 to L5 are
-    /// named, as by default.
+    /// The levels of a run with these kinds. If the light levels are L0 to L5 (the default), kinds on an axis without a named level get
+    /// their own ladder.
     ///
     /// # Errors
-    /// If a kind has no level, or a level no kind.
+    /// If a kind has no level, or a level has no kind.
     pub(super) fn for_kinds(&self, kinds: KindSet) -> Result<Vec<AxisLevel>> {
         let mut levels = self.0.clone();
         levels.retain(|level| *level != AxisLevel::PAIR);
-        let on = |axis: Axis| move |level: &&AxisLevel| level.axis() == Some(axis);
         let is_clean = levels.iter().all(|level| level.severity().is_none());
         let has_ladders = levels
             .iter()
             .filter(|level| level.axis() != Some(Axis::MOTION))
             .eq(&ladder(LIGHT));
         for axis in Axis::ALL.into_iter().filter(|_| !is_clean) {
-            let mut of_axis = kinds.kinds().filter(|kind| kind.axis() == axis);
-            match (of_axis.next(), self.0.iter().find(on(axis))) {
+            let kind = kinds.kinds().find(|kind| kind.axis() == axis);
+            let level = self.0.iter().find(|level| level.axis() == Some(axis));
+            match (kind, level) {
                 (Some(kind), None) if has_ladders => levels.extend(ladder(kind)),
                 (Some(kind), None) => {
-                    let [first, last] = ends(kind);
+                    let [first, last] = ladder_ends(kind);
                     let problem = format_args!(
                         "no level of {kind} is named; add {first}-{last}, or leave out {kind} in --variant"
                     );
@@ -55,12 +55,16 @@ impl Levels {
         Ok(levels)
     }
 
-    /// The kinds and profiles whose synthetic images are as dark as each frame's own photograph; empty unless `match` is among the
-    /// levels.
+    /// The kinds and profiles for synthetic images that are as dark as each frame's own photograph; empty unless the levels include
+    /// `match`.
     ///
     /// # Errors
-    /// If it is, and no kind reduces the light.
-    pub(super) fn matches(&self, kinds: KindSet, readings: &Readings) -> Result<Vec<PairDark>> {
+    /// If the levels include `match`, but no kind reduces the light.
+    pub(super) fn matches(
+        &self,
+        kinds: KindSet,
+        readings: &NoiseProfiles,
+    ) -> Result<Vec<PairDark>> {
         if !self.0.contains(&AxisLevel::PAIR) {
             return Ok(Vec::new());
         }
@@ -83,8 +87,8 @@ impl Levels {
     }
 }
 
-/// The first and the last level of a kind's own ladder.
-fn ends(kind: Kind) -> [String; 2] {
+/// Labels of the first and the last level of a kind's ladder.
+fn ladder_ends(kind: Kind) -> [String; 2] {
     let ladder = kind.ladder();
     [ladder.first(), ladder.last()]
         .map(|severity| severity.map_or(String::new(), |severity| kind.label(*severity)))
@@ -94,15 +98,17 @@ fn ends(kind: Kind) -> [String; 2] {
 mod tests {
     use super::*;
 
+    fn resolve(levels: &str, kinds: &str) -> std::result::Result<String, String> {
+        let levels: Levels = levels.parse().unwrap();
+        let levels = levels
+            .for_kinds(kinds.parse().unwrap())
+            .map_err(|e| e.to_string())?;
+        let names: Vec<String> = levels.iter().map(ToString::to_string).collect();
+        Ok(names.join(" "))
+    }
+
     #[test]
     fn each_kind_has_its_levels() {
-        let of = |levels: &str, kinds: &str| {
-            let levels: Levels = levels.parse().unwrap();
-            let levels = levels.for_kinds(kinds.parse().unwrap());
-            let levels = levels.map_err(|e| e.to_string())?;
-            let names: Vec<String> = levels.iter().map(ToString::to_string).collect();
-            Ok::<String, String>(names.join(" "))
-        };
         let light = "L0 L1 L2 L3 L4 L5";
         let times = "T8.33 T16.67 T33.33 T66.67 T133.33";
         for (levels, kinds, expected) in [
@@ -116,7 +122,7 @@ mod tests {
             ("L0,3.3", "auto", "L0 E3.3".to_owned()),
             ("L0", "all", "L0".to_owned()),
         ] {
-            assert_eq!(of(levels, kinds), Ok(expected), "{levels} {kinds}");
+            assert_eq!(resolve(levels, kinds), Ok(expected), "{levels} {kinds}");
         }
         for (levels, kinds, part) in [
             (
@@ -137,7 +143,7 @@ mod tests {
                 "T5 is a level of motion, but --variant both selects none of them",
             ),
         ] {
-            let error = of(levels, kinds).unwrap_err();
+            let error = resolve(levels, kinds).unwrap_err();
             assert!(error.contains(part), "{levels} {kinds}: {error}");
         }
     }

@@ -13,17 +13,17 @@ pub struct Levels(pub Vec<AxisLevel>);
 /// Maximum number of levels of a run; chosen.
 const MAX_LEVELS: usize = 200;
 
-/// The word for the darkness of each frame's own photograph.
+/// Level that is as dark as each frame's own photograph.
 const MATCH: &str = "match";
 
-/// Kind whose labels (L1 to L5) the light levels have.
+/// Kind that gives the light levels their labels (L1 to L5).
 pub(super) const LIGHT: Kind = Kind::ALL[0];
 
 impl FromStr for Levels {
     type Err = String;
 
-    /// Parses items between commas, in any order: `L3`, `L0-L5`, a number of EV, `0..10:0.5`, exposure times as `T33.33`, or `match`
-    /// for the darkness of each frame's own photograph. Sorts the levels and removes duplicates.
+    /// Parses items separated by commas, in any order: `L3`, `L0-L5`, a number of EV, `0..10:0.5`, exposure times such as `T33.33`, or
+    /// `match` (as dark as each frame's own photograph). Sorts the levels and removes duplicates.
     fn from_str(text: &str) -> Result<Self, String> {
         let mut levels = Vec::new();
         for item in text.split(',').map(str::trim) {
@@ -32,11 +32,11 @@ impl FromStr for Levels {
             } else if item.eq_ignore_ascii_case(MATCH) {
                 levels.push(AxisLevel::PAIR);
             } else if let Some((from, rest)) = item.split_once("..") {
-                levels.extend(steps(item, from.trim(), rest.trim())?);
+                levels.extend(stepped_range(item, from.trim(), rest.trim())?);
             } else if let Some((first, last)) = item.split_once('-') {
-                levels.extend(named(item, first.trim(), last.trim())?);
+                levels.extend(named_range(item, first.trim(), last.trim())?);
             } else {
-                levels.push(level(item)?);
+                levels.push(parse_level(item)?);
             }
         }
         levels.sort_unstable();
@@ -51,34 +51,31 @@ impl FromStr for Levels {
     }
 }
 
-/// The kind on whose axis a text lies, and the text without the letter of that axis.
-fn on_axis(text: &str) -> (Kind, &str) {
-    match text
-        .strip_prefix(['T', 't'])
-        .filter(|rest| rest.starts_with(|c: char| c.is_ascii_digit()))
-    {
+/// Splits the axis letter from a text: returns a kind on that axis and the rest of the text.
+fn split_axis(text: &str) -> (Kind, &str) {
+    match text.strip_prefix(['T', 't']).filter(|rest| is_number(rest)) {
         Some(number) => (Kind::Motion, number),
         None => (LIGHT, text),
     }
 }
 
-/// A level of the axis of a kind, as it is written in a range.
-fn written(kind: Kind, number: impl Display) -> String {
+/// A number on the axis of a kind, in the form used in ranges.
+fn range_number(kind: Kind, number: impl Display) -> String {
     match kind {
         Kind::Motion => format!("T{number}"),
         _ => number.to_string(),
     }
 }
 
-/// A range with a step, as an example on the axis of a kind.
-fn example(kind: Kind) -> &'static str {
+/// Example of a range with a step on the axis of a kind.
+fn example_range(kind: Kind) -> &'static str {
     match kind {
         Kind::Motion => "T10..T100:10",
         _ => "0..10:0.5",
     }
 }
 
-/// The levels of a kind's own ladder, from L0.
+/// L0 and the levels of a kind's ladder.
 pub(super) fn ladder(kind: Kind) -> Vec<AxisLevel> {
     let ladder = kind
         .ladder()
@@ -87,9 +84,8 @@ pub(super) fn ladder(kind: Kind) -> Vec<AxisLevel> {
     std::iter::once(AxisLevel::L0).chain(ladder).collect()
 }
 
-/// The named levels from one to another, as `L1-L4` or `T8.33-T133.33`; `item` is the text of the range.
-fn named(item: &str, first: &str, last: &str) -> Result<Vec<AxisLevel>, String> {
-    let is_number = |end: &str| end.starts_with(|c: char| c.is_ascii_digit());
+/// Parses a range of named levels, such as `L1-L4` or `T8.33-T133.33`. `item` is the text of the range.
+fn named_range(item: &str, first: &str, last: &str) -> Result<Vec<AxisLevel>, String> {
     if first.is_empty() {
         return Err(format!(
             "{item:?} is below 0; an exposure drop is a number of EV from 0 to {}",
@@ -101,51 +97,54 @@ fn named(item: &str, first: &str, last: &str) -> Result<Vec<AxisLevel>, String> 
             "{item:?} is not a range; write L0-L5 for the paper's levels, or {first}..{last}:0.5 for exposure drops in EV with a step of 0.5"
         ));
     }
-    let (kind, _) = on_axis(last);
-    let (from, to) = (level(first)?, level(last)?);
+    let (kind, _) = split_axis(last);
+    let (from, to) = (parse_level(first)?, parse_level(last)?);
     let ladder = ladder(kind);
-    let is_named = |end: &str, level| !is_number(end) && ladder.contains(level);
-    if !is_named(first, &from) || !is_named(last, &to) {
+    let are_named =
+        !is_number(first) && !is_number(last) && ladder.contains(&from) && ladder.contains(&to);
+    if !are_named {
         let names: Vec<String> = ladder.iter().map(ToString::to_string).collect();
         return Err(format!(
             "{item:?}: the ends of a range with a dash are two of {}; write {}..{}:{} for {}s in {} with a step of {}",
             names.join(", "),
-            written(kind, from.value()),
-            written(kind, to.value()),
-            step(kind),
+            range_number(kind, from.value()),
+            range_number(kind, to.value()),
+            example_step(kind),
             kind.axis().title,
             kind.axis().unit,
-            step(kind)
+            example_step(kind)
         ));
     }
     if from > to {
         return Err(format!("{item:?} runs backwards; write {to}-{from}"));
     }
     let range = from..=to;
-    Ok(ladder.into_iter().filter(|at| range.contains(at)).collect())
+    Ok(ladder
+        .into_iter()
+        .filter(|level| range.contains(level))
+        .collect())
 }
 
-/// The step of an example on the axis of a kind.
-fn step(kind: Kind) -> &'static str {
+/// Step of an example range on the axis of a kind.
+fn example_step(kind: Kind) -> &'static str {
     match kind {
         Kind::Motion => "10",
         _ => "0.5",
     }
 }
 
-/// The severities of a range with a step, as `0..10:0.5`; its end is one of them if a step ends there. `item` is the text of the
-/// range.
-fn steps(item: &str, from: &str, rest: &str) -> Result<Vec<AxisLevel>, String> {
-    let (kind, number) = on_axis(from);
+/// Parses a range with a step, such as `0..10:0.5`. The end is included if a step meets it. `item` is the text of the range.
+fn stepped_range(item: &str, from: &str, rest: &str) -> Result<Vec<AxisLevel>, String> {
+    let (kind, number) = split_axis(from);
     let unit = kind.axis().unit;
     let Some((to, by)) = rest.split_once(':') else {
         return Err(format!(
             "{item:?} has no step; write FROM..TO:STEP in {unit}, as {from}..{rest}:{}",
-            step(kind)
+            example_step(kind)
         ));
     };
-    let to = match on_axis(to.trim()) {
-        (of, number) if of == kind => number,
+    let to = match split_axis(to.trim()) {
+        (same, number) if same == kind => number,
         _ => to,
     };
     let (from, to) = (hundredths(item, kind, number)?, hundredths(item, kind, to)?);
@@ -155,13 +154,12 @@ fn steps(item: &str, from: &str, rest: &str) -> Result<Vec<AxisLevel>, String> {
             "{item:?} has a step of 0; the step is at least 0.01 {unit}"
         ));
     }
-    let value = |hundredths: u16| f64::from(hundredths) / 100.0;
     if from > to {
         return Err(format!(
             "{item:?} runs backwards; write {}..{}:{}",
-            written(kind, value(to)),
-            written(kind, value(from)),
-            value(step)
+            range_number(kind, f64::from(to) / 100.0),
+            range_number(kind, f64::from(from) / 100.0),
+            f64::from(step) / 100.0
         ));
     }
     Ok((from..=to)
@@ -173,25 +171,23 @@ fn steps(item: &str, from: &str, rest: &str) -> Result<Vec<AxisLevel>, String> {
         .collect())
 }
 
-/// A number of a range on the axis of a kind, in hundredths of its unit.
+/// Parses a number of a range on the axis of a kind, in hundredths of the unit of the axis.
 fn hundredths(item: &str, kind: Kind, number: &str) -> Result<u16, String> {
     let number = number.trim();
-    let is_number = number.starts_with(|c: char| c.is_ascii_digit());
-    if !is_number {
+    if !is_number(number) {
         return Err(format!(
             "{item:?}: {number:?} is not a number; write FROM..TO:STEP in {}, as {}",
             kind.axis().unit,
-            example(kind)
+            example_range(kind)
         ));
     }
-    let level = measured(kind, number).map_err(|problem| format!("{item:?}: {problem}"))?;
+    let level = parse_number(kind, number).map_err(|problem| format!("{item:?}: {problem}"))?;
     Ok(level.severity().map_or(0, Severity::in_hundredths))
 }
 
 /// Parses one level: a name, a number of EV, or an exposure time as T33.33.
-fn level(text: &str) -> Result<AxisLevel, String> {
-    let (kind, number) = on_axis(text);
-    let is_number = number.starts_with(|c: char| c.is_ascii_digit());
+fn parse_level(text: &str) -> Result<AxisLevel, String> {
+    let (kind, number) = split_axis(text);
     if text.eq_ignore_ascii_case("L0") {
         return Ok(AxisLevel::L0);
     }
@@ -201,15 +197,19 @@ fn level(text: &str) -> Result<AxisLevel, String> {
              200 lux, 2 lux are log2(200 / 2) = 6.6"
         ));
     }
-    if is_number {
-        return measured(kind, number);
+    if is_number(number) {
+        return parse_number(kind, number);
     }
     let severity = kind.severity(text).map_err(|e| e.to_string())?;
     Ok(AxisLevel::new(kind, severity))
 }
 
-/// The level of a number on the axis of a kind.
-fn measured(kind: Kind, number: &str) -> Result<AxisLevel, String> {
+fn is_number(text: &str) -> bool {
+    text.starts_with(|c: char| c.is_ascii_digit())
+}
+
+/// Parses a number on the axis of a kind as a level.
+fn parse_number(kind: Kind, number: &str) -> Result<AxisLevel, String> {
     if number.parse::<f64>() == Ok(0.0) {
         return Ok(AxisLevel::L0);
     }
@@ -237,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn levels_are_read_in_any_form() {
+    fn levels_are_parsed_in_any_form() {
         assert_eq!(names("L0-L5"), ["L0", "L1", "L2", "L3", "L4", "L5"]);
         assert_eq!(names("l3, L0,L3"), ["L0", "L3"]);
         assert_eq!(
@@ -247,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn a_range_has_a_step_and_the_papers_names_where_it_meets_them() {
+    fn ranges_use_the_names_of_the_papers_levels() {
         assert_eq!(
             names("0..10:2.5"),
             ["L0", "E2.5", "E5", "L4", "E10"],
@@ -261,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn the_darkness_of_pairs_is_a_level() {
+    fn match_is_a_level() {
         assert_eq!(names("match,L0"), ["L0", "dark"]);
         assert_eq!("match".parse(), Ok(Levels(vec![AxisLevel::PAIR])));
         assert!("match-L3".parse::<Levels>().is_err());
@@ -304,7 +304,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_level_is_named_with_the_right_form() {
+    fn errors_name_the_wrong_level_and_the_right_form() {
         for (wrong, part) in [
             ("L6", "\"L6\" is not one of L0, L1"),
             ("", "a level is missing; write levels as"),

@@ -1,4 +1,4 @@
-//! Degraded versions of a clean frame, as a camera would take it in less light. [`degrade`] is the entry point.
+//! Synthetic low light: degrades a clean frame as a camera would in less light. [`degrade`] is the entry point.
 //!
 //! ```
 //! # use darkqa_ground::types::{FrameId, Rgb};
@@ -11,8 +11,8 @@
 //! # Ok::<(), darkqa_ground::Error>(())
 //! ```
 //!
-//! [`raw::negative::ladder`] makes several levels with less work. [`CaptureState`] holds every number that decides an image, can be
-//! written and read, and makes the image again, its noise-free form, or its linear light.
+//! [`raw::negative::ladder`] makes several levels with less work. [`CaptureState`] is a serializable state that makes an image again, its
+//! noise-free form, or its linear light.
 //!
 //! ```text
 //! Exposure   sRGB ─ gamma ─ × 2^−ΔEV ─ gamma⁻¹ ─ 8 bit                            a table of 256 codes
@@ -24,13 +24,13 @@
 //! ```
 //!
 //! The sensor branch has no forward tone curve, because the paper lists none. Before the drop, its shadows are therefore
-//! brighter than those of the exposure branch (grey 16 becomes 39, 192 becomes 172). So the two branches differ in
-//! contrast as well as in noise.
+//! brighter than those of the exposure branch (grey 16 becomes 39, 192 becomes 172). So the two branches differ in both
+//! contrast and noise.
 //!
-//! The result depends only on the arguments and on [`VERSION`], not on threads, order or machine. Random numbers are
-//! addressed by where they are used (see [`draws`]). Powers and logarithms come from `libm` and are tabulated. All else is
-//! IEEE sums, products, quotients and square roots in a fixed order. The camera's state is computed in double precision,
-//! samples in single precision, many at once (see [`Isa`](darkqa_ground::types::images::Isa)).
+//! The result depends only on the arguments and on [`VERSION`], not on threads, order or machine. A random number depends only on its
+//! address, such as seed, frame and sensor site (see [`draws`]). Powers and logarithms are computed by `libm` and tabulated; all other
+//! operations are IEEE sums, products, quotients and square roots in a fixed order. The state of the camera is computed in double
+//! precision, samples in single precision with vector instructions (see [`Isa`](darkqa_ground::types::images::Isa)).
 
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test may panic"))]
 #![expect(
@@ -69,7 +69,7 @@ pub use exposure::{expose, expose_by};
 pub use exposures::Exposures;
 pub use exposures::version;
 pub use movement::{FrameView, Motion, MotionAngle, Streak, Tap};
-pub use noise_profile::{Amplify, Coupling, Draws, NoiseProfile, Readings, Synthesis, Tone};
+pub use noise_profile::{Amplify, Coupling, Draws, NoiseProfile, NoiseProfiles, Synthesis, Tone};
 pub use pair_ev::{PairEv, mean_luminance};
 pub use raw::CleanRaw;
 pub use raw::negative::{Negative, develop_with_state};
@@ -82,17 +82,16 @@ use darkqa_ground::error::Result;
 use darkqa_ground::types::{Degradation, Rgb};
 
 /// Version of the sensor branch, raised whenever a pixel changes, so that results of an older version are not reused.
-/// The exposure branch has [another](exposure::VERSION).
+/// The exposure branch has its own [version](exposure::VERSION).
 pub const VERSION: u32 = 2;
 
-/// The frame after a degradation; without one, the frame itself.
+/// Applies a degradation to a frame; without one, returns the frame.
 ///
-/// `synthesis` is the content of the degradation's noise profile. Automatic exposure and the camera's motion are as by default, and
-/// the focal length is not known. For other settings, and for several degradations of one frame, [`Exposures`] makes the images of
-/// [`AppliedDegradation`]s with less work.
+/// `synthesis` is the noise profile of the degradation. Automatic exposure and motion have their default settings, and the focal length
+/// is unknown. For other settings, and for several degradations of one frame, use [`AppliedDegradation`] and [`Exposures`].
 ///
 /// # Errors
-/// If the sensor lacks the gain of an automatic exposure, or the picture would move too far during the exposure.
+/// If the sensor does not have the gain that automatic exposure needs, or the image would move too far during the exposure.
 pub fn degrade(
     clean: &Rgb,
     degradation: Option<&Degradation>,

@@ -1,5 +1,5 @@
-//! Noise profiles, ways to understand the paper's noise model: [`Synthesis`], its named contents [`NoiseProfile`], and those
-//! of a run, [`Readings`].
+//! Noise profiles, interpretations of the paper's noise model: their choices ([`Synthesis`]), the named ones ([`NoiseProfile`]), and those
+//! of a run ([`NoiseProfiles`]).
 
 use std::collections::BTreeMap;
 
@@ -9,8 +9,8 @@ use super::camera::CameraModel;
 use darkqa_ground::error::{Error, Result};
 use darkqa_ground::types::{Degradation, ReadingName};
 
-/// Choices that define the sensor branch. The default follows the paper's words; where they leave a choice, `src/docs/method.md`
-/// states it with its effect.
+/// Choices that define the sensor branch. The default follows the paper; `src/docs/method.md` documents the choices that the paper leaves
+/// open, with their effects.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Synthesis {
     /// Noise terms that the ratio r amplifies.
@@ -25,17 +25,18 @@ pub struct Synthesis {
     pub camera: CameraModel,
 }
 
-/// A named way to understand the paper's noise model.
+/// A named interpretation of the paper's noise model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum NoiseProfile {
-    /// The words of the DarkQA paper. Read, row and quantisation noise act after the amplification, and add less than 0.1 codes.
+    /// As the DarkQA paper states it. Read, row and quantisation noise are added after the amplification, and contribute less than 0.1
+    /// codes.
     #[default]
     Paper,
     /// The ratio amplifies all noise, as in ELD (Wei et al. 2020).
     Eld,
     /// The ratio is 2^ΔEV: photons decrease with the level, read noise does not increase.
     Level,
-    /// As in physics: all noise is amplified, less light means fewer photons, and the tone curve is applied again.
+    /// Physical model: all noise is amplified, less light means fewer photons, and the tone curve is applied again.
     Physical,
 }
 
@@ -43,7 +44,7 @@ impl NoiseProfile {
     /// All profiles, in the order in which tables list them.
     pub const ALL: [Self; 4] = [Self::Paper, Self::Eld, Self::Level, Self::Physical];
 
-    /// Name in conditions, as `eld` in `L3-noise@eld`.
+    /// Name in conditions, such as `eld` in `L3-noise@eld`.
     #[must_use]
     pub fn name(self) -> ReadingName {
         match self {
@@ -74,7 +75,7 @@ impl Synthesis {
         }
     }
 
-    /// Name of the profile that has these choices, whatever the camera; `custom` if there is none.
+    /// Name of the profile with these choices, for any camera; `custom` if there is none.
     #[must_use]
     pub fn name(&self) -> ReadingName {
         NoiseProfile::ALL
@@ -87,59 +88,58 @@ impl Synthesis {
 /// Noise profiles of a run by name; at least one.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(transparent)]
-pub struct Readings(BTreeMap<ReadingName, Synthesis>);
+pub struct NoiseProfiles(BTreeMap<ReadingName, Synthesis>);
 
-impl Default for Readings {
+impl Default for NoiseProfiles {
     fn default() -> Self {
         Synthesis::default().into()
     }
 }
 
-impl From<Synthesis> for Readings {
+impl From<Synthesis> for NoiseProfiles {
     fn from(synthesis: Synthesis) -> Self {
         Self([(synthesis.name(), synthesis)].into())
     }
 }
 
-impl Readings {
+impl NoiseProfiles {
     /// Several named profiles with one camera; `paper` alone for an empty list.
     #[must_use]
-    pub fn named(readings: &[NoiseProfile], camera: &CameraModel) -> Self {
-        let contents: BTreeMap<_, _> = readings
+    pub fn from_profiles(readings: &[NoiseProfile], camera: &CameraModel) -> Self {
+        let profiles: BTreeMap<_, _> = readings
             .iter()
             .map(|reading| (reading.name(), Synthesis::new(*reading, camera.clone())))
             .collect();
-        if contents.is_empty() {
+        if profiles.is_empty() {
             return Synthesis::new(NoiseProfile::Paper, camera.clone()).into();
         }
-        Self(contents)
+        Self(profiles)
     }
 
-    /// Names and contents of the profiles, `paper` first.
+    /// Names and choices of the profiles, `paper` first.
     pub fn iter(&self) -> impl Iterator<Item = (&ReadingName, &Synthesis)> {
         self.0.iter()
     }
 
-    /// The sensor of all profiles, with neither its gain nor its ratio pinned.
+    /// The sensor that all profiles share, without pinned gain and ratio.
     pub fn camera(&self) -> CameraModel {
         self.0
             .values()
             .next()
-            .map(|content| &content.camera)
+            .map(|synthesis| &synthesis.camera)
             .map_or_else(CameraModel::default, CameraModel::unpinned)
     }
 
-    /// Content of a degradation's noise profile. For a kind without profiles it is any of them, because the pixels do not
-    /// depend on it.
+    /// The choices of a degradation's noise profile; those of any profile for a kind whose pixels do not depend on it.
     ///
     /// # Errors
     /// If the run does not have the profile.
     pub fn for_degradation(&self, degradation: Option<&Degradation>) -> Result<&Synthesis> {
-        let content = match degradation.and_then(Degradation::reading) {
+        let synthesis = match degradation.and_then(Degradation::reading) {
             None => self.0.values().next(),
             Some(name) => self.get(name),
         };
-        content.ok_or_else(|| {
+        synthesis.ok_or_else(|| {
             let names: Vec<&str> = self.0.keys().map(ReadingName::as_str).collect();
             let problem = format_args!(
                 "{} needs a noise profile that is not among those of --profile ({}); add it there",
@@ -150,19 +150,19 @@ impl Readings {
         })
     }
 
-    /// Content of the profile of this name; `None` if the run does not have it.
+    /// The choices of the profile of this name; `None` if the run does not have it.
     pub fn get(&self, name: &ReadingName) -> Option<&Synthesis> {
         self.0.get(name)
     }
 
-    /// The content of the only profile.
+    /// The choices of the only profile.
     ///
     /// # Errors
     /// If there are several.
     pub fn only(&self) -> Result<&Synthesis> {
-        let mut contents = self.0.values();
-        match (contents.next(), contents.next()) {
-            (Some(content), None) => Ok(content),
+        let mut profiles = self.0.values();
+        match (profiles.next(), profiles.next()) {
+            (Some(synthesis), None) => Ok(synthesis),
             _ => Err(Error::usage(
                 "--profile",
                 "this command takes one noise profile",
@@ -222,9 +222,9 @@ pub enum Coupling {
 }
 
 impl Coupling {
-    /// How many EV above white the sensor saturates, in front of a scene and after an exposure drop. In the paper's chain light is
-    /// clipped at white before the drop (0). If less light means fewer photons, the light is gone before it reaches the
-    /// sensor, which then saturates that much later.
+    /// Light at which the sensor saturates for linear scene light, in EV above white. In the paper, light is clipped at white before the
+    /// drop, so the headroom is 0. If less light means fewer photons, light is reduced before it reaches the sensor, so the headroom equals
+    /// the drop.
     #[must_use]
     pub fn headroom_ev(self, drop_ev: f64) -> f64 {
         match self {
@@ -243,7 +243,7 @@ mod tests {
 
     #[cfg(feature = "flags")]
     #[test]
-    fn values_are_written_as_they_are_read() {
+    fn values_have_the_same_text_in_flags_and_json() {
         for name in ["none", "before-ev", "after-ev"] {
             let tone = <Tone as clap::ValueEnum>::from_str(name, false).unwrap();
             assert_eq!(tone.to_string(), name);
@@ -264,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn parts_that_match_a_reading_have_its_name() {
+    fn choices_of_a_profile_have_its_name() {
         let mut camera = CameraModel::default();
         camera.pin_gain(0.1).unwrap();
         for reading in NoiseProfile::ALL {
@@ -279,8 +279,9 @@ mod tests {
     }
 
     #[test]
-    fn a_reading_that_the_run_lacks_is_named() {
-        let readings = Readings::named(&[NoiseProfile::Paper], &CameraModel::default());
+    fn errors_name_the_missing_profile() {
+        let readings =
+            NoiseProfiles::from_profiles(&[NoiseProfile::Paper], &CameraModel::default());
         let degradation: Degradation = "L3-noise@eld".parse().unwrap();
         let error = readings
             .for_degradation(Some(&degradation))

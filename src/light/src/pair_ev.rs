@@ -6,8 +6,8 @@ use darkqa_ground::types::Rgb;
 /// Weights of red, green and blue in the luminance of linear sRGB (ITU-R BT.709).
 const LUMINANCE: [f64; 3] = [0.2126, 0.7152, 0.0722];
 
-/// Exposure difference between two photographs of the same scene, in EV; positive if the second is darker. The photographs need not be
-/// aligned or of equal size.
+/// Exposure difference between two photographs of the same scene, in EV; positive if the second is darker. The photographs may be
+/// misaligned and differ in size.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PairEv {
     /// log₂ of the ratio of the mean linear luminances, bright to dark.
@@ -15,8 +15,8 @@ pub struct PairEv {
     /// Median of the per-pixel log₂ luminance ratios, without pixels that are black in either image. For images of different sizes, log₂
     /// of the ratio of the median luminances. `None` if no ratio is defined.
     pub median: Option<f64>,
-    /// Drop that makes the bright image as dark as the other one in [`expose`](super::expose): as `mean`, with light computed as
-    /// code^2.2.
+    /// Exposure drop with which [`expose`](super::expose) makes the bright image as dark as the other one: like `mean`, but with light
+    /// computed as code^2.2.
     pub synthesis: f64,
 }
 
@@ -32,29 +32,32 @@ impl PairEv {
             luminance(normal, srgb_to_linear),
             luminance(low, srgb_to_linear),
         );
-        let ev = |bright: f64, dark: f64| {
-            (bright > 0.0 && dark > 0.0).then(|| libm::log2(bright / dark))
-        };
         let is_same_size = (normal.height(), normal.width()) == (low.height(), low.width());
-        let gamma_mean = |image| mean(&luminance(image, |code| libm::pow(code, GAMMA)));
+        let [gamma_bright, gamma_dark] =
+            [normal, low].map(|image| mean(&luminance(image, |code| libm::pow(code, GAMMA))));
         Some(Self {
-            mean: ev(mean(&bright), mean(&dark))?,
-            synthesis: ev(gamma_mean(normal), gamma_mean(low))?,
+            mean: ev_difference(mean(&bright), mean(&dark))?,
+            synthesis: ev_difference(gamma_bright, gamma_dark)?,
             median: if is_same_size {
                 median(
                     bright
                         .iter()
                         .zip(&dark)
-                        .filter_map(|(bright, dark)| ev(*bright, *dark))
+                        .filter_map(|(bright, dark)| ev_difference(*bright, *dark))
                         .collect(),
                 )
             } else {
                 median(bright)
                     .zip(median(dark))
-                    .and_then(|(bright, dark)| ev(bright, dark))
+                    .and_then(|(bright, dark)| ev_difference(bright, dark))
             },
         })
     }
+}
+
+/// log₂ of the ratio of two luminances; `None` if one of them is 0.
+fn ev_difference(bright: f64, dark: f64) -> Option<f64> {
+    (bright > 0.0 && dark > 0.0).then(|| libm::log2(bright / dark))
 }
 
 /// Mean linear luminance of an image, from 0 to 1; 0 for an image without pixels.
@@ -114,7 +117,7 @@ mod tests {
     /// Darkens an image by `ev` EV. A dither before rounding to 8 bits preserves the mean of dark codes.
     fn darker(image: &Rgb, ev: f64) -> Rgb {
         let mut dark = image.clone();
-        for (place, code) in dark.samples_mut().iter_mut().enumerate() {
+        for (index, code) in dark.samples_mut().iter_mut().enumerate() {
             let light = srgb_to_linear(f64::from(*code) / 255.0) * libm::exp2(-ev);
             let exact = if light <= 0.003_130_8 {
                 255.0 * 12.92 * light
@@ -122,7 +125,7 @@ mod tests {
                 255.0 * (1.055 * libm::pow(light, 1.0 / 2.4) - 0.055)
             };
             let dither =
-                f64::from((place as u32).wrapping_mul(2_246_822_519) >> 8) / f64::from(1 << 24);
+                f64::from((index as u32).wrapping_mul(2_246_822_519) >> 8) / f64::from(1 << 24);
             *code = (exact + dither).floor() as u8;
         }
         dark

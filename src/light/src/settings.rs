@@ -1,4 +1,4 @@
-//! Levels, kinds and noise of degradations: as flags ([`LightArgs`], [`SensorArgs`]) and resolved ([`LightSettings`],
+//! Levels, kinds and noise of degradations: flags ([`LightArgs`], [`SensorArgs`]) and resolved settings ([`LightSettings`],
 //! [`SensorSettings`]).
 
 use clap::{Args, ValueEnum};
@@ -9,7 +9,9 @@ use super::auto::{AutoExposure, AutoSettings};
 use super::draws::NoiseKey;
 use super::levels::{LIGHT, Levels, ladder};
 use super::movement::{FrameView, Motion};
-use super::noise_profile::{Amplify, Coupling, Draws, NoiseProfile, Readings, Synthesis, Tone};
+use super::noise_profile::{
+    Amplify, Coupling, Draws, NoiseProfile, NoiseProfiles, Synthesis, Tone,
+};
 use super::{CameraModel, Sampling};
 use darkqa_ground::error::{Error, Result};
 use darkqa_ground::types::degradations::Kind;
@@ -41,7 +43,7 @@ pub struct LightArgs {
 }
 
 impl LightArgs {
-    /// The levels: those that are named, else L0 to L5, and of photographs in the dark L0 alone, because their own noise is in them.
+    /// The named levels; by default L0 to L5, or only L0 for photographs in the dark, which contain real noise.
     pub fn levels(&self, set: SetLight) -> Levels {
         self.levels.clone().unwrap_or_else(|| {
             Levels(match set {
@@ -158,7 +160,7 @@ impl Profile {
 pub struct LightSettings {
     /// Levels in ascending order of degradation, axis by axis, without duplicates.
     pub levels: Vec<AxisLevel>,
-    /// Synthetic images that are as dark as each frame's own photograph; none unless `--levels` has `match`.
+    /// Synthetic images that are as dark as each frame's own photograph; empty unless `--levels` includes `match`.
     pub matches: Vec<PairDark>,
     /// Kinds of degradation at all levels of their axis except L0.
     pub variants: KindSet,
@@ -182,8 +184,8 @@ pub struct KindSettings {
 pub struct SensorSettings {
     /// Seed of all random draws.
     pub seed: u64,
-    /// Noise profiles that noisy images are made in.
-    pub readings: Readings,
+    /// Noise profiles of the noisy images.
+    pub readings: NoiseProfiles,
 }
 
 impl LightSettings {
@@ -206,10 +208,10 @@ impl LightSettings {
         Ok(light)
     }
 
-    /// Refuses synthetic images that match photographs, because there are no photographs; `why` gives the reason.
+    /// Refuses the level `match` for data without photographs in the dark; `why` is the reason in the message.
     ///
     /// # Errors
-    /// If `--levels` has `match`.
+    /// If `--levels` includes `match`.
     pub fn refuse_matches(&self, why: &str) -> Result<()> {
         if self.matches.is_empty() {
             return Ok(());
@@ -220,7 +222,7 @@ impl LightSettings {
         Err(Error::usage("--levels", problem))
     }
 
-    /// Degradations of each frame, level by level: each kind, in each of its noise profiles; `None` is L0.
+    /// All degradations of a frame, level by level: each kind with each of its noise profiles; `None` stands for L0.
     pub fn degradations(&self) -> Vec<Option<Degradation>> {
         let mut all = Vec::new();
         for level in &self.levels {
@@ -240,10 +242,12 @@ impl LightSettings {
                 } else {
                     vec![None]
                 };
-                let degradations = readings
-                    .into_iter()
-                    .filter_map(|reading| Degradation::new(kind, severity, reading).ok());
-                all.extend(degradations.map(Some));
+                all.extend(
+                    readings
+                        .into_iter()
+                        .filter_map(|reading| Degradation::new(kind, severity, reading).ok())
+                        .map(Some),
+                );
             }
         }
         all
@@ -267,8 +271,8 @@ impl KindSettings {
     /// Resolves a degradation for a frame.
     ///
     /// # Errors
-    /// If the noise profile is not among those of `--profile`, the sensor lacks the gain of an automatic exposure, or the picture would
-    /// move too far.
+    /// If `--profile` does not include the noise profile, the sensor does not have the gain that automatic exposure needs, or the image
+    /// would move too far.
     pub fn apply(
         &self,
         how: &Degradation,
@@ -279,10 +283,10 @@ impl KindSettings {
         AppliedDegradation::new(how, synthesis, &self.auto, &self.motion, view, key)
     }
 
-    /// Checks what can be known of a degradation without its frame.
+    /// Checks a degradation as far as possible without its frame.
     ///
     /// # Errors
-    /// If the sensor lacks the gain of an automatic exposure.
+    /// If the sensor does not have the gain that automatic exposure needs.
     fn check(&self, how: &Degradation) -> Result<()> {
         if how.kind() == Kind::Auto {
             let camera = self.sensor.readings.camera();
@@ -305,18 +309,17 @@ impl SensorSettings {
     }
 }
 
-/// The profiles of `--profile`; for a single one, with the choices of the other flags.
-fn readings(args: &SensorArgs) -> Result<Readings> {
-    let profiles = args.profile.iter();
+/// The profiles of `--profile`; a single one with the choices of the other flags.
+fn readings(args: &SensorArgs) -> Result<NoiseProfiles> {
     let mut chosen: Vec<NoiseProfile> = Vec::new();
-    for reading in profiles.flat_map(|profile| profile.readings()) {
+    for reading in args.profile.iter().flat_map(|profile| profile.readings()) {
         if !chosen.contains(reading) {
             chosen.push(*reading);
         }
     }
     let camera = camera(args)?;
     if let [reading] = chosen[..] {
-        return synthesis(args, Synthesis::new(reading, camera)).map(Readings::from);
+        return synthesis(args, Synthesis::new(reading, camera)).map(NoiseProfiles::from);
     }
     let choices = [
         ("--noise amplify", args.amplify.is_some()),
@@ -337,7 +340,7 @@ fn readings(args: &SensorArgs) -> Result<Readings> {
         let problem = format!("the ratio of {name} is 2^EV; leave out --noise ratio or {name}");
         return Err(Error::usage("--noise ratio", problem));
     }
-    Ok(Readings::named(&chosen, &camera))
+    Ok(NoiseProfiles::from_profiles(&chosen, &camera))
 }
 
 /// A profile's choices, each replaced if its flag is set.
@@ -378,19 +381,23 @@ mod tests {
 
     /// The sensor settings of these command-line words.
     fn sensor(words: &[&str]) -> Result<SensorSettings> {
-        let command = SensorArgs::augment_args(clap::Command::new("sensor"));
         let words = std::iter::once("sensor").chain(words.iter().copied());
-        let matches = command.try_get_matches_from(words);
-        let matches = matches.map_err(|e| Error::usage("words", e))?;
+        let matches = SensorArgs::augment_args(clap::Command::new("sensor"))
+            .try_get_matches_from(words)
+            .map_err(|e| Error::usage("words", e))?;
         SensorSettings::resolve(&SensorArgs::from_arg_matches(&matches).unwrap())
+    }
+
+    fn profile_names(words: &[&str]) -> Result<Vec<String>> {
+        Ok(sensor(words)?
+            .readings
+            .iter()
+            .map(|(name, _)| name.to_string())
+            .collect())
     }
 
     #[test]
     fn profiles_are_a_list_and_flags_change_a_single_one() {
-        let names = |words: &[&str]| -> Result<Vec<String>> {
-            let readings = sensor(words)?.readings;
-            Ok(readings.iter().map(|(name, _)| name.to_string()).collect())
-        };
         for (words, expected) in [
             (
                 &["--profile=physical,paper"][..],
@@ -400,7 +407,7 @@ mod tests {
             (&["--profile=physical", "--tone=none"], &["custom"]),
             (&["--profile=physical", "--tone=before-ev"], &["physical"]),
         ] {
-            assert_eq!(names(words).unwrap(), expected, "{words:?}");
+            assert_eq!(profile_names(words).unwrap(), expected, "{words:?}");
         }
         for (words, part) in [
             (
@@ -422,7 +429,7 @@ mod tests {
             ),
             (&["--camera=no/such.toml"], "no/such.toml"),
         ] {
-            let error = names(words).unwrap_err().to_string();
+            let error = profile_names(words).unwrap_err().to_string();
             assert!(error.contains(part), "{words:?}: {error}");
         }
     }
@@ -436,8 +443,8 @@ mod tests {
         assert_eq!(synthesis.amplify, Amplify::All);
         assert_eq!(synthesis.tone, Tone::None);
         assert_eq!(synthesis.coupling, Coupling::Photon);
-        assert_eq!(sensor(&[]).unwrap().readings, Readings::default());
+        assert_eq!(sensor(&[]).unwrap().readings, NoiseProfiles::default());
         let nikon = sensor(&["--camera=nikon-d850"]).unwrap().readings;
-        assert_ne!(nikon, Readings::default());
+        assert_ne!(nikon, NoiseProfiles::default());
     }
 }

@@ -1,7 +1,8 @@
-//! Signal-to-noise ratio of flat greys by level and noise profile: that of RAW samples against its formula, and that of codes.
+//! Tests of the signal-to-noise ratio of flat greys by level and noise profile: RAW samples against a formula, and codes against the
+//! documentation.
 //!
-//! With the sample y in ADU and v = σ_TL² · var(λ) + σ_row² + 1/12, the noise of a noise profile has the variance r · K · y + v,
-//! and r · K · y + r² · v if r amplifies all terms; r is 2^ΔEV if light is photons.
+//! For a sample y in ADU and v = σ_TL² · var(λ) + σ_row² + 1/12, the variance of the noise is r · K · y + v, or r · K · y + r² · v if r
+//! amplifies all terms. If less light means fewer photons, r is 2^ΔEV.
 
 use super::camera::{CameraModel, CameraState, Sampling};
 use super::raw::noise::{self, Term};
@@ -24,7 +25,7 @@ fn tukey_variance(shape: f64) -> f64 {
     2.0 / (shape * shape) * (1.0 / (1.0 + 2.0 * shape) - middle)
 }
 
-/// The noise profile with the camera in the middle of its ranges, of gain `gain`.
+/// The noise profile with the camera in the middle of its ranges and gain K.
 fn fixed(reading: NoiseProfile, gain: f64) -> Synthesis {
     let mut camera = CameraModel::default();
     camera.set_sampling(Sampling::Fixed);
@@ -49,7 +50,7 @@ fn moments(numbers: impl Iterator<Item = f64> + Clone) -> [f64; 2] {
 }
 
 /// The ratio by formula for a sample of `y` ADU.
-fn formula(amplify: Amplify, state: &CameraState, y: f64) -> f64 {
+fn expected_ratio(amplify: Amplify, state: &CameraState, y: f64) -> f64 {
     let after = state.read_scale.powi(2) * tukey_variance(state.read_shape)
         + state.row_deviation.powi(2)
         + 1.0 / 12.0;
@@ -61,25 +62,26 @@ fn formula(amplify: Amplify, state: &CameraState, y: f64) -> f64 {
 }
 
 /// The ratio of green RAW samples: measured, and by formula.
-fn raw(reading: NoiseProfile, gain: f64, code: u8, level: Severity) -> [f64; 2] {
+fn raw_ratios(reading: NoiseProfile, gain: f64, code: u8, level: Severity) -> [f64; 2] {
     let synthesis = fixed(reading, gain);
     let state = synthesis.state(&key(code), level);
     let mut raw = unprocess(&flat(code), &state);
     let y = f64::from(raw.sample(0, 1)) * state.adu_range;
     noise::add(&mut raw, &state, &key(code), synthesis.amplify, &Term::ALL);
-    // The two planes of green have offsets of their own.
-    let greens = (0..SIZE / 2).flat_map(|row| (0..SIZE / 2).map(move |column| [row, column]));
+    // Only one of the two green planes is used, because each has its own offset.
     assert_eq!(Plane::at(0, 1), Plane::Gr);
-    let greens = greens.map(|[row, column]| f64::from(raw.sample(2 * row, 2 * column + 1)));
+    let greens = (0..SIZE / 2)
+        .flat_map(|row| (0..SIZE / 2).map(move |column| [row, column]))
+        .map(|[row, column]| f64::from(raw.sample(2 * row, 2 * column + 1)));
     let [_, deviation] = moments(greens);
     [
         y / (deviation * state.adu_range),
-        formula(synthesis.amplify, &state, y),
+        expected_ratio(synthesis.amplify, &state, y),
     ]
 }
 
-/// The ratio of green codes: their mean over their standard deviation.
-fn code(reading: NoiseProfile, gain: f64, code: u8, level: Severity) -> f64 {
+/// The ratio of green codes: mean over standard deviation.
+fn code_ratio(reading: NoiseProfile, gain: f64, code: u8, level: Severity) -> f64 {
     let synthesis = fixed(reading, gain);
     let image = Negative::new(&flat(code), &key(code), &synthesis, level).develop(level);
     let greens = image.samples().iter().skip(1).step_by(3);
@@ -93,12 +95,12 @@ fn middle_gain() -> f64 {
 }
 
 #[test]
-fn the_ratio_of_raw_samples_is_that_of_the_formula() {
+fn raw_ratios_follow_the_formula() {
     for reading in NoiseProfile::ALL {
         for grey in GREYS {
             let falls: Vec<f64> = Severity::LADDER
                 .map(|level| {
-                    let [found, expected] = raw(reading, middle_gain(), grey, level);
+                    let [found, expected] = raw_ratios(reading, middle_gain(), grey, level);
                     let name = reading.name();
                     assert!(
                         (found / expected - 1.0).abs() < 0.03,
@@ -113,7 +115,7 @@ fn the_ratio_of_raw_samples_is_that_of_the_formula() {
                 NoiseProfile::Paper | NoiseProfile::Eld => {
                     assert!(falls.iter().all(|fall| (fall - 1.0).abs() < 0.01));
                 }
-                // At least as the root of the light.
+                // The ratio falls at least with the square root of the light.
                 NoiseProfile::Level | NoiseProfile::Physical => {
                     let steps = Severity::LADDER
                         .windows(2)
@@ -128,23 +130,23 @@ fn the_ratio_of_raw_samples_is_that_of_the_formula() {
     }
 }
 
-/// The formula tells the profiles apart: that of one misses the other by far more than the bound of the test above.
+/// The formula of another profile is off by far more than the tolerance of the test above.
 #[test]
-fn the_formula_of_another_reading_does_not_hold() {
+fn the_formula_distinguishes_profiles() {
     let (grey, level) = (GREYS[0], Severity::L5);
-    let [of_paper, _] = raw(NoiseProfile::Paper, middle_gain(), grey, level);
+    let [paper, _] = raw_ratios(NoiseProfile::Paper, middle_gain(), grey, level);
     for other in [
         NoiseProfile::Eld,
         NoiseProfile::Level,
         NoiseProfile::Physical,
     ] {
-        let [_, expected] = raw(other, middle_gain(), grey, level);
-        assert!((of_paper / expected - 1.0).abs() > 0.2, "{other:?}");
+        let [_, expected] = raw_ratios(other, middle_gain(), grey, level);
+        assert!((paper / expected - 1.0).abs() > 0.2, "{other:?}");
     }
 }
 
 /// The rows of the table in `src/docs/light.md`: the name of a noise profile, and RAW and code ratios at L1 to L5 of both greys.
-fn documented() -> Vec<(String, [[f64; 5]; 4])> {
+fn documented_ratios() -> Vec<(String, [[f64; 5]; 4])> {
     let place = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/light.md");
     let page = std::fs::read_to_string(place).unwrap();
     page.lines()
@@ -168,23 +170,25 @@ fn documented() -> Vec<(String, [[f64; 5]; 4])> {
         .collect()
 }
 
-/// Two per cent: the numbers of the page have two digits or three.
+/// The tolerance is 2 %, because the numbers of the page have two or three digits.
 #[test]
-fn the_table_of_the_documentation_is_measured() {
+fn documented_ratios_equal_the_measured_ones() {
     let mut off = Vec::new();
-    let documented = documented();
+    let documented = documented_ratios();
     let names = NoiseProfile::ALL.map(|reading| reading.name().to_string());
     assert!(documented.iter().map(|(name, _)| name).eq(&names));
     for (reading, (_, rows)) in NoiseProfile::ALL.into_iter().zip(documented) {
-        let [first, second] = GREYS;
-        let raw = |grey| Severity::LADDER.map(|level| raw(reading, middle_gain(), grey, level)[0]);
-        let code = |grey| Severity::LADDER.map(|level| code(reading, middle_gain(), grey, level));
-        let found = [raw(first), raw(second), code(first), code(second)];
-        for (found, row) in found.iter().zip(rows) {
+        let raw = GREYS.map(|grey| {
+            Severity::LADDER.map(|level| raw_ratios(reading, middle_gain(), grey, level)[0])
+        });
+        let code = GREYS.map(|grey| {
+            Severity::LADDER.map(|level| code_ratio(reading, middle_gain(), grey, level))
+        });
+        for (found, row) in raw.iter().chain(&code).zip(rows) {
             if found
                 .iter()
-                .zip(&row)
-                .any(|(found, stated): (&f64, &f64)| (found / stated - 1.0).abs() > 0.02)
+                .zip(row)
+                .any(|(found, stated)| f64::abs(found / stated - 1.0) > 0.02)
             {
                 off.push(format!("{reading:?} {found:.2?}, stated {row:?}"));
             }

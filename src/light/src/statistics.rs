@@ -1,4 +1,4 @@
-//! Comparison of each noise term with theory and with `rand_distr`, over ten million draws; over a billion with
+//! Tests of each noise term against theory and `rand_distr` with ten million draws; with a billion draws by
 //! `cargo test --release -- --ignored draws`.
 
 use rand_distr::Distribution;
@@ -21,30 +21,31 @@ fn stream(component: Component) -> Stream {
     NoiseKey::new(21, &FrameId("noise".to_owned())).stream(component)
 }
 
-/// Sum of the counts that `tally` makes of `n` draws (rounded up to whole batches), a thousand batches at a time.
-fn tallied(n: usize, bins: usize, tally: impl Fn(&RandomField, &mut [u64]) + Sync) -> Vec<u64> {
+/// Histogram of `n` draws (rounded up to whole batches), computed in parallel by rows of a thousand batches. `tally` counts one batch.
+fn histogram(n: usize, bins: usize, tally: impl Fn(&RandomField, &mut [u64]) + Sync) -> Vec<u64> {
     let field = stream(Component::RandomField);
     let rows = n.div_ceil(1000 * LANES);
-    let row = |row: usize| {
-        let mut counts = vec![0; bins];
-        for index in 0..1000 {
-            tally(&field.field(Site::new(row, 2 * LANES * index)), &mut counts);
-        }
-        counts
-    };
-    let sum = |mut a: Vec<u64>, b: Vec<u64>| {
-        a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
-        a
-    };
     (0..rows)
         .into_par_iter()
-        .map(row)
-        .reduce(|| vec![0; bins], sum)
+        .map(|row| {
+            let mut counts = vec![0; bins];
+            for index in 0..1000 {
+                tally(&field.field(Site::new(row, 2 * LANES * index)), &mut counts);
+            }
+            counts
+        })
+        .reduce(
+            || vec![0; bins],
+            |mut a, b| {
+                a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
+                a
+            },
+        )
 }
 
 fn poisson_counts(mean: f64, n: usize) -> Vec<u64> {
     let bins = (mean + 14.0 * mean.sqrt() + 30.0) as usize;
-    tallied(n, bins, |field, counts| {
+    histogram(n, bins, |field, counts| {
         let mut numbers = [mean as f32; LANES];
         poisson::lanes(&mut numbers, [&field.shot[0], &field.shot[1]]);
         for number in numbers {
@@ -76,27 +77,28 @@ fn chi_square(observed: &[u64], expected: impl Fn(usize) -> f64) -> f64 {
     (chi - freedom) / f64::sqrt(2.0 * freedom)
 }
 
-/// Mean and variance of numbers, given by the counts of their bins.
-fn moments(counts: &[u64], at: impl Fn(usize) -> f64) -> [f64; 2] {
+/// Mean and variance of a histogram, whose bins have the values `value_at(bin)`.
+fn moments(counts: &[u64], value_at: impl Fn(usize) -> f64) -> [f64; 2] {
     let n = counts.iter().sum::<u64>() as f64;
-    let sum = |f: &dyn Fn(f64) -> f64| {
-        counts
-            .iter()
-            .enumerate()
-            .map(|(index, count)| *count as f64 * f(at(index)))
-            .sum::<f64>()
-    };
-    let mean = sum(&|x| x) / n;
-    [mean, sum(&|x| (x - mean) * (x - mean)) / n]
+    let (mut sum, mut squares) = (0.0, 0.0);
+    for (bin, count) in counts.iter().enumerate() {
+        sum += *count as f64 * value_at(bin);
+    }
+    let mean = sum / n;
+    for (bin, count) in counts.iter().enumerate() {
+        let off = value_at(bin) - mean;
+        squares += *count as f64 * (off * off);
+    }
+    [mean, squares / n]
 }
 
-/// Means on both sides of every boundary of the sampler: the halves, the expansion, the ranges of K and r.
+/// Means on both sides of every boundary of the sampler: multiples of ½, the start of the expansion, the ranges of K and r.
 const MEANS: [f64; 16] = [
     0.01, 0.1, 0.3, 0.5, 0.999, 1.75, 4.2, 9.99, 15.5, 31.25, 47.98, 48.0, 64.0, 120.5, 200.0,
     1587.1,
 ];
 
-fn poissons_are_poissons(n: usize) {
+fn assert_poisson_distribution(n: usize) {
     for mean in MEANS {
         // The sampler takes single precision.
         let mean = f64::from(mean as f32);
@@ -119,20 +121,20 @@ fn poissons_are_poissons(n: usize) {
 }
 
 #[test]
-fn ten_million_draws_of_shot_noise_are_poissons() {
-    poissons_are_poissons(TEN_MILLION);
+fn ten_million_draws_of_shot_noise_follow_poisson() {
+    assert_poisson_distribution(TEN_MILLION);
 }
 
 #[test]
 #[ignore = "a billion draws for each of sixteen means"]
-fn a_billion_draws_of_shot_noise_are_poissons() {
-    poissons_are_poissons(BILLION);
+fn a_billion_draws_of_shot_noise_follow_poisson() {
+    assert_poisson_distribution(BILLION);
 }
 
-/// Random number generator for the samplers of `rand_distr`, with the index of the next draw.
-struct OtherSampler(Stream, usize);
+/// Random number generator for the samplers of `rand_distr`: a stream and the index of the next draw.
+struct ReferenceRng(Stream, usize);
 
-impl rand::TryRng for OtherSampler {
+impl rand::TryRng for ReferenceRng {
     type Error = std::convert::Infallible;
 
     fn try_next_u32(&mut self) -> Result<u32, Self::Error> {
@@ -174,7 +176,7 @@ fn an_independent_sampler_agrees() {
         let mut theirs = vec![0; ours.len()];
         let poisson = rand_distr::Poisson::new(f64::from(mean)).unwrap();
         for number in poisson
-            .sample_iter(OtherSampler(stream(Component::Camera), 0))
+            .sample_iter(ReferenceRng(stream(Component::Camera), 0))
             .take(n)
         {
             theirs[number as usize] += 1;
@@ -192,7 +194,7 @@ fn shot_noise_keeps_the_mean_and_its_variance_is_k_times_the_mean() {
         (6.0, 9.52),
         (0.1, 158.71),
     ] {
-        let counts = tallied(1_000_000, 4000, |field, counts| {
+        let counts = histogram(1_000_000, 4000, |field, counts| {
             let mut adu = [y; LANES];
             noise::shot(&mut adu, gain, [&field.shot[0], &field.shot[1]]);
             for z in adu {
@@ -219,8 +221,8 @@ fn shot_noise_keeps_the_mean_and_its_variance_is_k_times_the_mean() {
 /// All shapes λ of the five calibrated cameras, in units of 1/70.
 const SHAPES: [f64; 11] = [-10.0, -9.0, -8.0, -6.0, -4.0, -3.0, 0.0, 3.0, 4.0, 8.0, 9.0];
 
-/// The counts below each quantile are those of the closed form, also in the tails.
-fn read_noise_has_its_quantiles(n: usize) {
+/// Asserts that read noise has the quantiles of the closed form, including the tails.
+fn assert_read_noise_quantiles(n: usize) {
     let lower = [1e-5, 1e-4, 1e-3, 0.01, 0.05, 0.1, 0.25, 0.4, 0.5];
     let upper = lower.iter().rev().skip(1).map(|u| 1.0 - u);
     let levels: Vec<f64> = lower.iter().copied().chain(upper).collect();
@@ -230,7 +232,7 @@ fn read_noise_has_its_quantiles(n: usize) {
             .iter()
             .map(|u| tukey_lambda(*u, shape) as f32)
             .collect();
-        let counts = tallied(n, levels.len() + 1, |field, counts| {
+        let counts = histogram(n, levels.len() + 1, |field, counts| {
             let mut adu = [0.0; LANES];
             noise::read(&mut adu, 1.0, &table, 0.0, &field.read);
             for x in adu {
@@ -249,22 +251,22 @@ fn read_noise_has_its_quantiles(n: usize) {
 
 #[test]
 fn ten_million_draws_of_read_noise_have_its_quantiles() {
-    read_noise_has_its_quantiles(TEN_MILLION);
+    assert_read_noise_quantiles(TEN_MILLION);
 }
 
 #[test]
 #[ignore = "a billion draws for each of eleven shapes"]
 fn a_billion_draws_of_read_noise_have_its_quantiles() {
-    read_noise_has_its_quantiles(BILLION);
+    assert_read_noise_quantiles(BILLION);
 }
 
 /// Sum and sum of squares of a batch, in double precision.
 fn sums(numbers: &Lanes<f32>) -> [f64; 2] {
-    let numbers = || numbers.iter().map(|x| f64::from(*x));
-    [numbers().sum(), numbers().map(|x| x * x).sum()]
+    let numbers = numbers.map(f64::from);
+    [numbers.iter().sum(), numbers.iter().map(|x| x * x).sum()]
 }
 
-/// Spread and offset at both ends and in the middle of the paper's range of K.
+/// Deviation and offset at both ends and in the middle of the paper's range of K.
 #[test]
 fn read_noise_has_its_spread_and_its_offset() {
     // λ, σ_TL, standard deviation, excess kurtosis.
@@ -303,6 +305,15 @@ fn read_noise_has_its_spread_and_its_offset() {
     }
 }
 
+/// Histogram with bins of width 0.1 from −6 to 6.
+fn normal_histogram(numbers: impl Iterator<Item = f64>) -> Vec<u64> {
+    let mut counts = vec![0; 120];
+    for z in numbers {
+        counts[((z + 6.0) * 10.0).clamp(0.0, 119.0) as usize] += 1;
+    }
+    counts
+}
+
 #[test]
 fn row_noise_is_normal_and_uncorrelated_between_rows() {
     let deviation = 0.6;
@@ -325,15 +336,10 @@ fn row_noise_is_normal_and_uncorrelated_between_rows() {
         let off = product / n * n.sqrt();
         assert!(off.abs() < BOUND, "lag {lag}: {off} errors off");
     }
-    let counts = |numbers: &mut dyn Iterator<Item = f64>| {
-        let mut counts = vec![0; 120];
-        numbers.for_each(|z| counts[((z + 6.0) * 10.0).clamp(0.0, 119.0) as usize] += 1);
-        counts
-    };
-    let ours = counts(&mut rows.iter().take(1_000_000).copied());
-    let words = OtherSampler(self::stream(Component::Camera), 0);
-    let theirs = counts(
-        &mut rand_distr::StandardNormal
+    let ours = normal_histogram(rows.iter().take(1_000_000).copied());
+    let words = ReferenceRng(self::stream(Component::Camera), 0);
+    let theirs = normal_histogram(
+        rand_distr::StandardNormal
             .sample_iter(words)
             .take(1_000_000),
     );
@@ -342,7 +348,7 @@ fn row_noise_is_normal_and_uncorrelated_between_rows() {
 
 #[test]
 fn quantisation_noise_is_uniform_within_half_a_step() {
-    let counts = tallied(TEN_MILLION, 1000, |field, counts| {
+    let counts = histogram(TEN_MILLION, 1000, |field, counts| {
         let mut adu = [0.0; LANES];
         noise::quantisation(&mut adu, &field.quantisation);
         for y in adu {

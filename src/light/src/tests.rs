@@ -1,4 +1,4 @@
-//! Tests of the whole pipeline: its figures, and that pixels depend on its arguments alone.
+//! Tests of the whole pipeline: its figures, and that pixels depend only on its arguments.
 
 use super::camera::tests::median;
 use super::raw::negative::ladder;
@@ -15,7 +15,7 @@ fn sensor(severity: Severity) -> Degradation {
     Degradation::new(Kind::Sensor, severity, None).unwrap()
 }
 
-fn exposure_of(severity: Severity) -> Degradation {
+fn exposure_drop(severity: Severity) -> Degradation {
     Degradation::new(Kind::Exposure, severity, None).unwrap()
 }
 
@@ -25,29 +25,31 @@ fn flat(code: u8, size: usize) -> Rgb {
 
 /// Red rises along a row, green along a column, blue falls along the diagonal.
 fn ramps(height: usize, width: usize) -> Rgb {
-    let code = |at: usize, size: usize| (at * 255 / size.max(2)) as u8;
     let samples = (0..height * width).flat_map(|i| {
         let (row, column) = (i / width, i % width);
-        let diagonal = 255 - code(row + column, height + width);
-        [code(column, width), code(row, height), diagonal]
+        let diagonal = 255 - ramp_code(row + column, height + width);
+        [ramp_code(column, width), ramp_code(row, height), diagonal]
     });
     Rgb::new(height, width, samples.collect()).unwrap()
+}
+
+fn ramp_code(position: usize, size: usize) -> u8 {
+    (position * 255 / size.max(2)) as u8
 }
 
 /// Mean and standard deviation of each channel.
 fn statistics(image: &Rgb) -> [[f64; 2]; 3] {
     let n = (image.height() * image.width()) as f64;
     std::array::from_fn(|channel| {
-        let codes = || {
-            image
-                .samples()
-                .iter()
-                .skip(channel)
-                .step_by(3)
-                .map(|code| f64::from(*code))
-        };
-        let mean = codes().sum::<f64>() / n;
-        let variance = codes().map(|code| (code - mean).powi(2)).sum::<f64>() / n;
+        let codes: Vec<f64> = image
+            .samples()
+            .iter()
+            .skip(channel)
+            .step_by(3)
+            .map(|code| f64::from(*code))
+            .collect();
+        let mean = codes.iter().sum::<f64>() / n;
+        let variance = codes.iter().map(|code| (code - mean).powi(2)).sum::<f64>() / n;
         [mean, variance.sqrt()]
     })
 }
@@ -66,14 +68,14 @@ fn one_negative_gives_the_images_of_degrade() {
     for level in Severity::LADDER {
         let alone = degrade(&clean, Some(&sensor(level)), &key, &paper).unwrap();
         assert_eq!(alone, negative.develop(level));
-        let exposed = degrade(&clean, Some(&exposure_of(level)), &key, &paper).unwrap();
+        let exposed = degrade(&clean, Some(&exposure_drop(level)), &key, &paper).unwrap();
         assert_eq!(exposed, expose(&clean, level));
     }
 }
 
-/// A change of these bytes changes every result, so it must raise [`VERSION`].
+/// If these bytes change, every result changes, so [`VERSION`] must be raised.
 #[test]
-fn bytes_are_those_of_this_version() {
+fn bytes_match_this_version() {
     let clean = ramps(48, 63);
     let mut bytes = Vec::new();
     for level in Severity::LADDER {
@@ -99,18 +101,18 @@ fn bytes_are_those_of_this_version() {
     );
 }
 
-/// The bytes of choices other than the default, including another camera.
+/// Bytes of other choices than the default, including another camera.
 #[test]
-fn bytes_of_every_choice_are_those_of_this_version() {
+fn bytes_of_other_choices_match_this_version() {
     let clean = ramps(37, 130);
-    let camera = || CameraModel::preset("nikon-d850").unwrap();
+    let camera = CameraModel::preset("nikon-d850").unwrap();
     let choices = [
         Synthesis::new(NoiseProfile::Physical, CameraModel::default()),
-        Synthesis::new(NoiseProfile::Physical, camera()),
+        Synthesis::new(NoiseProfile::Physical, camera.clone()),
         Synthesis {
             draws: Draws::Fresh,
             tone: Tone::AfterEv,
-            ..Synthesis::new(NoiseProfile::Paper, camera())
+            ..Synthesis::new(NoiseProfile::Paper, camera)
         },
     ];
     let mut bytes = Vec::new();
@@ -134,7 +136,7 @@ fn bytes_of_every_choice_are_those_of_this_version() {
 
 #[test]
 fn the_number_of_threads_does_not_change_the_image() {
-    let develop = |threads| {
+    let [one, two, five] = [1, 2, 5].map(|threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
         pool.build().unwrap().install(|| {
             let negative = Negative::new(
@@ -145,17 +147,15 @@ fn the_number_of_threads_does_not_change_the_image() {
             );
             Severity::LADDER.map(|level| negative.develop(level))
         })
-    };
-    let single = develop(1);
-    for threads in [2, 5] {
-        assert_eq!(single, develop(threads));
-    }
+    });
+    assert_eq!(one, two);
+    assert_eq!(one, five);
 }
 
 #[test]
 fn seed_and_frame_change_the_image() {
     let clean = flat(128, 64);
-    let take = |seed, frame| {
+    let [first, other_seed, other_frame] = [(1, "a"), (2, "a"), (1, "b")].map(|(seed, frame)| {
         let negative = Negative::with_state(
             &clean,
             &key(seed, frame),
@@ -166,17 +166,20 @@ fn seed_and_frame_change_the_image() {
             0.0,
         );
         negative.develop(Severity::L1)
-    };
-    let first = take(1, "a");
-    for other in [take(2, "a"), take(1, "b")] {
-        let pairs = || first.samples().chunks(3).zip(other.samples().chunks(3));
-        let changed = pairs().filter(|(a, b)| a != b).count();
-        assert!(changed * 10 > pairs().count() * 9, "{changed} changed");
+    });
+    for other in [other_seed, other_frame] {
+        let changed = first
+            .samples()
+            .chunks(3)
+            .zip(other.samples().chunks(3))
+            .filter(|(a, b)| a != b)
+            .count();
+        assert!(changed * 10 > 64 * 64 * 9, "{changed} changed");
     }
 }
 
 #[test]
-fn every_size_is_kept() {
+fn the_size_never_changes() {
     for (height, width) in [
         (1, 1),
         (1, 2),
@@ -194,9 +197,9 @@ fn every_size_is_kept() {
     }
 }
 
-/// Published figures of flat greys for the fixed camera: mean and deviation of red, green and blue.
+/// Documented figures of flat greys with the fixed camera: mean and standard deviation of red, green and blue.
 #[test]
-fn flat_greys_have_their_figures() {
+fn flat_greys_have_the_documented_figures() {
     let cases = [
         (128, Severity::L1, [[66.1, 15.2], [67.3, 9.4], [67.0, 11.0]]),
         (128, Severity::L3, [[18.7, 4.3], [19.1, 2.7], [19.0, 3.1]]),
@@ -216,8 +219,11 @@ fn flat_greys_have_their_figures() {
         );
         let found = statistics(&negative.develop(level));
         for (found, expected) in found.iter().flatten().zip(expected.iter().flatten()) {
-            let close = (found - expected).abs() < 0.01 * expected + 0.07;
-            assert!(close, "grey {code}, {level:?}: {found} against {expected}");
+            let is_close = (found - expected).abs() < 0.01 * expected + 0.07;
+            assert!(
+                is_close,
+                "grey {code}, {level:?}: {found} against {expected}"
+            );
         }
     }
 }
@@ -240,9 +246,8 @@ fn noise_shrinks_with_the_light() {
     }
 }
 
-/// Without noise, grey and white become as dark as in the exposure branch.
 #[test]
-fn without_noise_a_mid_grey_and_white_are_the_exposure_branchs() {
+fn without_noise_mid_grey_and_white_equal_the_exposure_branch() {
     for code in [128, 255] {
         let clean = flat(code, 4);
         for seed in 0..20 {
@@ -272,9 +277,9 @@ fn without_noise_a_mid_grey_and_white_are_the_exposure_branchs() {
     }
 }
 
-/// With the tone curve, which the paper leaves out, a grey ramp comes back unchanged.
+/// With the tone curve, which the paper omits, the sensor branch does not change greys.
 #[test]
-fn a_grey_ramp_comes_back_from_the_sensor_branch() {
+fn a_grey_ramp_is_unchanged_with_the_tone_curve() {
     let samples = (0..4 * 256).flat_map(|i| [(i % 256) as u8; 3]).collect();
     let clean = Rgb::new(4, 256, samples).unwrap();
     for seed in 0..20 {
@@ -283,8 +288,8 @@ fn a_grey_ramp_comes_back_from_the_sensor_branch() {
         let key = key(seed, "a");
         let negative =
             Negative::with_state(&clean, &key, &state, Amplify::ShotOnly, tone, &[], 0.0);
-        let back = negative.develop_by(0.0);
-        for (column, codes) in back.samples().chunks(3).enumerate() {
+        let developed = negative.develop_by(0.0);
+        for (column, codes) in developed.samples().chunks(3).enumerate() {
             for code in codes {
                 assert!(
                     code.abs_diff((column % 256) as u8) <= 2,
@@ -295,11 +300,11 @@ fn a_grey_ramp_comes_back_from_the_sensor_branch() {
     }
 }
 
-/// Before the drop, the tone curve gives the greys of the exposure branch; after it, it is applied to the degraded image.
+/// Before the drop, the tone curve gives the greys of the exposure branch; after the drop, it is applied to the degraded image.
 #[test]
 fn the_tone_curve_is_applied_where_it_is_set() {
     let clean = flat(100, 4);
-    let develop = |tone| {
+    let [none, before, after] = [Tone::None, Tone::BeforeEv, Tone::AfterEv].map(|tone| {
         let negative = Negative::with_state(
             &clean,
             &key(1, "a"),
@@ -310,10 +315,10 @@ fn the_tone_curve_is_applied_where_it_is_set() {
             0.0,
         );
         negative.develop(Severity::L1)
-    };
-    assert_eq!(develop(Tone::BeforeEv), expose(&clean, Severity::L1));
-    let degraded = f64::from(develop(Tone::None).samples()[0]) / 255.0;
-    let after = develop(Tone::AfterEv).samples()[0];
+    });
+    assert_eq!(before, expose(&clean, Severity::L1));
+    let degraded = f64::from(none.samples()[0]) / 255.0;
+    let after = after.samples()[0];
     let expected = degraded * degraded * (3.0 - 2.0 * degraded) * 255.0;
     assert!(
         (f64::from(after) - expected).abs() < 1.0,
@@ -321,9 +326,9 @@ fn the_tone_curve_is_applied_where_it_is_set() {
     );
 }
 
-/// With `photon`, less light means fewer photons: the ratio grows with the level. In the paper's profile it does not.
+/// With [`Coupling::Photon`], the ratio is 2^ΔEV; in the paper's profile it does not depend on the level.
 #[test]
-fn coupling_makes_the_ratio_the_drop() {
+fn photon_coupling_sets_the_ratio_by_the_drop() {
     let physical = Synthesis::new(NoiseProfile::Physical, CameraModel::default());
     for (found, expected) in Severity::LADDER
         .map(|level| physical.state(&key(1, "a"), level).ratio)
@@ -333,13 +338,13 @@ fn coupling_makes_the_ratio_the_drop() {
         assert!((found - expected).abs() < 0.01, "{found}");
     }
     let paper = Synthesis::default();
-    let state = |level| paper.state(&key(1, "a"), level);
-    assert_eq!(state(Severity::L1), state(Severity::L5));
+    let [l1, l5] = [Severity::L1, Severity::L5].map(|level| paper.state(&key(1, "a"), level));
+    assert_eq!(l1, l5);
 }
 
-/// [`ladder`] gives the images of the single negatives, for every size and every choice of draws.
+/// [`ladder`] makes the same images as single negatives, for all sizes and choices of draws.
 #[test]
-fn ladders_are_their_negatives() {
+fn ladders_equal_single_negatives() {
     let settings = [
         Synthesis::default(),
         Synthesis::new(NoiseProfile::Physical, CameraModel::default()),
@@ -357,7 +362,7 @@ fn ladders_are_their_negatives() {
             ladder(&clean, &key, synthesis, &Severity::LADDER, &mut samples);
             for (level, image) in Severity::LADDER.into_iter().zip(&images) {
                 let negative = Negative::new(&clean, &key, synthesis, level);
-                assert!(negative.serves(level));
+                assert!(negative.can_develop(level));
                 assert_eq!(
                     negative.develop(level),
                     *image,
@@ -375,12 +380,12 @@ fn fresh_draws_differ_between_levels() {
         ..Synthesis::default()
     };
     let clean = flat(128, 32);
-    let at = |level| Negative::new(&clean, &key(1, "a"), &fresh, level);
-    assert!(!at(Severity::L1).serves(Severity::L2));
-    let [first, second] = [Severity::L1, Severity::L2].map(|level| at(level).develop(Severity::L3));
-    assert_ne!(first, second);
-    let state = |level| fresh.state(&key(1, "a"), level);
-    assert_eq!(state(Severity::L1), state(Severity::L2));
+    let levels = [Severity::L1, Severity::L2];
+    let [first, second] = levels.map(|level| Negative::new(&clean, &key(1, "a"), &fresh, level));
+    assert!(!first.can_develop(Severity::L2));
+    assert_ne!(first.develop(Severity::L3), second.develop(Severity::L3));
+    let [first, second] = levels.map(|level| fresh.state(&key(1, "a"), level));
+    assert_eq!(first, second);
 }
 
 #[test]

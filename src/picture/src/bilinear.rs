@@ -1,4 +1,4 @@
-//! Bilinear scaling of images, as OpenCV does it: [`bilinear`].
+//! Bilinear scaling of images, as in OpenCV: [`bilinear`].
 
 use darkqa_ground::error::Result;
 use darkqa_ground::types::Rgb;
@@ -6,22 +6,21 @@ use darkqa_ground::types::Rgb;
 /// The weight 1.0 in OpenCV's fixed point (`INTER_RESIZE_COEF_SCALE`).
 const ONE: f32 = 2048.0;
 
-/// Two neighbouring samples of the source, by index, and their weights.
+/// The two source pixels (indices) of an output pixel along one axis, and their weights.
 #[derive(Debug, Clone, Copy)]
 struct Tap {
-    at: [usize; 2],
+    indices: [usize; 2],
     weights: [i32; 2],
 }
 
-/// The image scaled so that its longer side has `side` pixels: the result of `cv2.resize(image, None, fx=f, fy=f)` with
-/// f = side / max(height, width). The image is not smoothed before, so that its noise stays noise.
+/// Scales an image so that its longer side has `side` pixels, as `cv2.resize(image, None, fx=f, fy=f)` with
+/// f = side / max(height, width). The image is not smoothed first, so that its noise is kept.
 ///
-/// The arithmetic is that of `resizeGeneric_` for 8-bit images with `INTER_LINEAR` (OpenCV 4, modules/imgproc/src/resize.cpp).
-/// Compared with OpenCV 5.0, images that shrink are the same bit for bit. In images that grow, fewer than one sample in a
-/// thousand differs, by one code.
+/// The arithmetic follows `resizeGeneric_` for 8-bit images with `INTER_LINEAR` (OpenCV 4, modules/imgproc/src/resize.cpp). Downscaled
+/// images equal those of OpenCV 5.0 bit for bit; in upscaled images, fewer than one sample in a thousand differs, by one code.
 ///
 /// # Errors
-/// Only if the result's samples do not fit into memory.
+/// If the samples of the result do not fit into memory.
 pub fn bilinear(image: &Rgb, side: usize) -> Result<Rgb> {
     let (height, width) = (image.height(), image.width());
     if height.max(width) == side {
@@ -31,10 +30,10 @@ pub fn bilinear(image: &Rgb, side: usize) -> Result<Rgb> {
     let columns = taps(width, factor);
     let rows = taps(height, factor);
     let mut samples = Vec::with_capacity(rows.len() * columns.len() * 3);
-    // The two source rows that the last row was made of, with their index. The next row mostly needs one of them again.
+    // The last two interpolated source rows, with their indices. The next output row often needs one of them again.
     let mut cached = [const { (usize::MAX, Vec::new()) }; 2];
     for tap in &rows {
-        let [above, below] = tap.at;
+        let [above, below] = tap.indices;
         if cached[0].0 != above {
             if cached[1].0 == above {
                 cached.swap(0, 1);
@@ -48,12 +47,17 @@ pub fn bilinear(image: &Rgb, side: usize) -> Result<Rgb> {
             cached[1].0 = below;
         }
         let below = usize::from(below != above);
-        let pairs = cached[0].1.iter().zip(&cached[below].1);
-        samples.extend(pairs.map(|(above, below)| {
-            let [first, second] = tap.weights;
-            let sum = ((first * (above >> 4)) >> 16) + ((second * (below >> 4)) >> 16);
-            ((sum + 2) >> 2).clamp(0, 255) as u8
-        }));
+        let [first, second] = tap.weights;
+        samples.extend(
+            cached[0]
+                .1
+                .iter()
+                .zip(&cached[below].1)
+                .map(|(above, below)| {
+                    let sum = ((first * (above >> 4)) >> 16) + ((second * (below >> 4)) >> 16);
+                    ((sum + 2) >> 2).clamp(0, 255) as u8
+                }),
+        );
     }
     Rgb::new(rows.len(), columns.len(), samples)
 }
@@ -62,16 +66,16 @@ pub fn bilinear(image: &Rgb, side: usize) -> Result<Rgb> {
 #[must_use]
 pub(crate) fn bilinear_size(height: usize, width: usize, side: usize) -> [usize; 2] {
     let factor = side as f64 / height.max(width) as f64;
-    [height, width].map(|length| scaled(length, factor))
+    [height, width].map(|length| scale_length(length, factor))
 }
 
-fn scaled(length: usize, factor: f64) -> usize {
+fn scale_length(length: usize, factor: f64) -> usize {
     ((length as f64 * factor).round_ties_even() as usize).max(1)
 }
 
-/// The taps of each output pixel along a side of `length` pixels.
+/// The taps of all output pixels along a side of `length` source pixels.
 fn taps(length: usize, factor: f64) -> Vec<Tap> {
-    let count = scaled(length, factor);
+    let count = scale_length(length, factor);
     let last = length - 1;
     (0..count)
         .map(|index: usize| {
@@ -83,7 +87,7 @@ fn taps(length: usize, factor: f64) -> Vec<Tap> {
                 floor => (floor as usize, position - floor),
             };
             Tap {
-                at: [first, (first + 1).min(last)],
+                indices: [first, (first + 1).min(last)],
                 weights: [1.0 - fraction, fraction]
                     .map(|weight| (weight * ONE).round_ties_even() as i32),
             }
@@ -91,13 +95,13 @@ fn taps(length: usize, factor: f64) -> Vec<Tap> {
         .collect()
 }
 
-/// Interpolates one row of the source at the columns of the result, into `out`.
+/// Interpolates one source row at the output columns, into `out`.
 fn interpolate_row(image: &Rgb, row: usize, columns: &[Tap], out: &mut Vec<i32>) {
     let width = 3 * image.width();
     let line = &image.samples()[row * width..][..width];
     out.clear();
     for tap in columns {
-        let [left, right] = tap.at.map(|column| 3 * column);
+        let [left, right] = tap.indices.map(|column| 3 * column);
         let [first, second] = tap.weights;
         for channel in 0..3 {
             let (a, b) = (line[left + channel], line[right + channel]);

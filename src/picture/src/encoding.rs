@@ -1,4 +1,4 @@
-//! Image files written to memory: [`png()`] and [`jpeg`] of pixels, [`grey_png`] of maps, [`exr()`] of linear light.
+//! Encoders of image files: [`png()`] and [`jpeg`] for pixels, [`grey_png`] for maps, [`exr()`] for linear light.
 
 use std::fmt;
 use std::io::Cursor;
@@ -13,21 +13,21 @@ use crate::payload_format::Quality;
 use darkqa_ground::error::{Error, Result};
 use darkqa_ground::types::{Light, Rgb, Rgb16Image};
 
-/// An error about an image that has no name here.
+/// An error about an image whose file name is unknown here.
 pub(crate) fn image_error(problem: impl fmt::Display) -> Error {
     Error::data("image", problem)
 }
 
-/// A side as file formats count it.
+/// The length of a side, in pixels, as a 32-bit number.
 ///
 /// # Errors
-/// If it is too long.
+/// If the side is too long for any file format.
 pub(crate) fn side(pixels: usize) -> Result<u32> {
     u32::try_from(pixels)
         .map_err(|_| image_error(format_args!("a side of {pixels} pixels is too long")))
 }
 
-/// An image as a lossless PNG file, at the lowest compression effort: 26 times faster than the default, files are 2 % larger.
+/// Encodes an image as a PNG file with fast compression: 26 times as fast as the default, with files 2 % larger.
 ///
 /// # Errors
 /// If a side is too long for the format.
@@ -40,7 +40,7 @@ pub fn png(image: &Rgb) -> Result<Vec<u8>> {
     Ok(file)
 }
 
-/// An image of 16-bit codes as a lossless PNG file.
+/// Encodes an image of 16-bit codes as a PNG file.
 ///
 /// # Errors
 /// If a side is too long for the format.
@@ -58,11 +58,11 @@ pub(crate) fn png_16(image: &Rgb16Image) -> Result<Vec<u8>> {
     Ok(file)
 }
 
-/// A map of one 16-bit number a pixel as a grey PNG file, of a width and height in pixels, row by row.
+/// Encodes a map of one 16-bit number per pixel, row by row, as a grey PNG file.
 ///
 /// # Errors
-/// If a side is too long for the format, or the samples do not fill the sides.
-pub fn grey_png((width, height): (usize, usize), samples: &[u16]) -> Result<Vec<u8>> {
+/// If a side is too long for the format, or the number of samples does not match the size.
+pub fn grey_png(width: usize, height: usize, samples: &[u16]) -> Result<Vec<u8>> {
     if samples.len() != width * height {
         return Err(image_error("its samples do not fill its sides"));
     }
@@ -82,7 +82,7 @@ pub fn grey_png((width, height): (usize, usize), samples: &[u16]) -> Result<Vec<
     Ok(file)
 }
 
-/// A JPEG file without chroma subsampling, so that colour noise keeps its resolution as far as the quality allows.
+/// Encodes a JPEG file without chroma subsampling, to keep the resolution of colour noise.
 ///
 /// # Errors
 /// If a side is too long for the format.
@@ -101,21 +101,20 @@ pub(crate) fn jpeg(samples: &[u8], width: u32, height: u32, quality: Quality) ->
     Ok(file)
 }
 
-/// The bytes of an OpenEXR file of linear light: 32-bit floats, compressed without loss.
+/// Encodes linear light as an OpenEXR file of 32-bit floats with lossless compression.
 ///
 /// # Errors
-/// Only if memory is short.
+/// If memory is insufficient.
 pub fn exr(light: &Light) -> Result<Vec<u8>> {
     let (width, height) = (light.width(), light.height());
-    let pixel = |at: Vec2<usize>| {
-        let samples = &light.samples()[3 * (at.y() * width + at.x())..];
-        (samples[0], samples[1], samples[2])
-    };
     let layer = Layer::new(
         (width, height),
         LayerAttributes::default(),
         Encoding::SMALL_LOSSLESS,
-        SpecificChannels::rgb(pixel),
+        SpecificChannels::rgb(|at: Vec2<usize>| {
+            let samples = &light.samples()[3 * (at.y() * width + at.x())..];
+            (samples[0], samples[1], samples[2])
+        }),
     );
     let mut file = Cursor::new(Vec::new());
     Image::from_layer(layer)

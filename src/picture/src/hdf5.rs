@@ -1,40 +1,39 @@
-//! Two-dimensional arrays in HDF5 files, as h5py writes them: [`Hdf5Array`].
+//! Two-dimensional arrays in HDF5 files written by h5py: [`Hdf5Array`].
 //!
-//! Supports the library's default output (HDF5 File Format Specification, version 3.0): superblocks 0 and 1, groups as symbol tables,
-//! object headers of version 1, integers and floats, arrays in one piece or in chunks, with the filters deflate, shuffle and fletcher32.
-//! Files of `libver="latest"` are refused by name.
+//! Supports the default output of h5py (HDF5 File Format Specification, version 3.0): superblock versions 0 and 1, symbol-table groups,
+//! version 1 object headers, integers and floats, contiguous and chunked storage, and the filters deflate, shuffle and fletcher32. Files
+//! of `libver="latest"` are refused with a message that says so.
 
 use std::io::Read as _;
 
 use crate::npy::Npy;
-use crate::reading_rule::MOST_PIXELS;
+use crate::reading_rule::MAX_PIXELS;
 
-/// The first eight bytes of every file.
+/// The first eight bytes of every HDF5 file.
 const SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
 
-/// The most nodes of trees that are visited in a file; chosen. It also ends trees that go in a circle.
-const MOST_NODES: usize = 1 << 16;
+/// Maximum number of B-tree nodes visited in a file; chosen. It also ends cyclic trees.
+const MAX_NODES: usize = 1 << 16;
 
-/// An array of two dimensions.
+/// A two-dimensional array.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Hdf5Array {
     /// Height and width (rows, columns).
     size: (usize, usize),
-    /// The type of the numbers, as `.npy` files state it.
+    /// Type of the numbers, in the notation of `.npy` files.
     descr: String,
     /// The numbers, row by row.
     data: Vec<u8>,
 }
 
 impl Hdf5Array {
-    /// Reads the array of this name in the root group; if there is none, the only array of the group.
+    /// Reads the array of this name in the root group, or the only array of the group if it has another name.
     ///
     /// # Errors
-    /// If the file is broken, or holds anything else. The error names the fault.
+    /// If the file is broken, unsupported, or has several arrays but none of this name.
     pub fn parse(file: &[u8], name: &str) -> Result<Self, String> {
         let file = Bytes(file);
-        let root = file.root()?;
-        let objects = file.objects(root)?;
+        let objects = file.objects(file.root_header()?)?;
         let named = objects.iter().find(|object| object.name == name);
         let array = match (named, &*objects) {
             (Some(object), _) | (None, [object]) => object.header,
@@ -46,20 +45,20 @@ impl Hdf5Array {
                 ));
             }
         };
-        let layout = ArrayLayout::read(&file, array)?;
-        layout.array(&file)
+        ArrayLayout::read(&file, array)?.read_array(&file)
     }
 
-    /// The numbers as those of a `.npy` file.
+    /// The numbers, through the reader of `.npy` files.
     ///
     /// # Errors
-    /// If their type is none that is read.
+    /// If their type is not supported.
     pub fn numbers(&self) -> Result<Npy<'_>, String> {
-        Npy::new(&self.descr, self.size, &self.data)
+        let (rows, columns) = self.size;
+        Npy::new(&self.descr, rows, columns, &self.data)
     }
 }
 
-/// The bytes of a file. All numbers are little-endian; addresses and lengths have 8 bytes.
+/// The bytes of a file or of a part of it. All numbers are little-endian; addresses and lengths have 8 bytes.
 #[derive(Clone, Copy)]
 struct Bytes<'a>(&'a [u8]);
 
@@ -75,40 +74,44 @@ struct Message<'a> {
     data: Bytes<'a>,
 }
 
-fn cut() -> String {
+fn truncated() -> String {
     "not a whole HDF5 file: it ends too early".to_owned()
 }
 
 impl<'a> Bytes<'a> {
-    /// Some bytes.
-    fn part(self, at: u64, length: u64) -> Result<&'a [u8], String> {
-        let part = || {
-            let at = usize::try_from(at).ok()?;
-            let end = at.checked_add(usize::try_from(length).ok()?)?;
-            self.0.get(at..end)
-        };
-        part().ok_or_else(cut)
+    /// The `length` bytes from an offset.
+    fn slice(self, at: u64, length: u64) -> Result<&'a [u8], String> {
+        usize::try_from(at)
+            .ok()
+            .zip(usize::try_from(length).ok())
+            .and_then(|(start, length)| self.0.get(start..start.checked_add(length)?))
+            .ok_or_else(truncated)
     }
 
-    /// A whole number of at most 8 bytes.
+    /// An unsigned integer of at most 8 bytes.
     fn number(self, at: u64, length: u64) -> Result<u64, String> {
-        let bytes = self.part(at, length)?;
+        let bytes = self.slice(at, length)?;
         Ok(bytes
             .iter()
             .rev()
             .fold(0, |sum, byte| sum << 8 | u64::from(*byte)))
     }
 
-    /// Checks that bytes begin with a mark.
-    fn expect(self, at: u64, mark: &[u8]) -> Result<(), String> {
-        if self.part(at, mark.len() as u64)? == mark {
+    /// An unsigned integer of 8 bytes as an index; `usize::MAX` if it does not fit.
+    fn index(self, at: u64) -> Result<usize, String> {
+        Ok(usize::try_from(self.number(at, 8)?).unwrap_or(usize::MAX))
+    }
+
+    /// Checks that a structure begins with its signature.
+    fn expect_signature(self, at: u64, signature: &[u8]) -> Result<(), String> {
+        if self.slice(at, signature.len() as u64)? == signature {
             return Ok(());
         }
         Err(format!("the HDF5 file is broken at byte {at}"))
     }
 
-    /// The address of the header of the root group.
-    fn root(self) -> Result<u64, String> {
+    /// The address of the object header of the root group.
+    fn root_header(self) -> Result<u64, String> {
         if !self.0.starts_with(SIGNATURE) {
             return Err("not an HDF5 file".to_owned());
         }
@@ -141,11 +144,11 @@ impl<'a> Bytes<'a> {
         let mut blocks = vec![(header.saturating_add(16), self.number(header + 8, 4)?)];
         let mut messages = Vec::new();
         while let Some((start, length)) = blocks.pop() {
-            let block = Bytes(self.part(start, length)?);
+            let block = Bytes(self.slice(start, length)?);
             let mut at = 0;
             while at + 8 <= length && (messages.len() as u64) < count {
                 let (kind, size) = (block.number(at, 2)?, block.number(at + 2, 2)?);
-                let data = Bytes(block.part(at + 8, size)?);
+                let data = Bytes(block.slice(at + 8, size)?);
                 if kind == CONTINUATION {
                     blocks.push((data.number(0, 8)?, data.number(8, 8)?));
                 }
@@ -164,18 +167,18 @@ impl<'a> Bytes<'a> {
             .find(|message| message.kind == SYMBOL_TABLE)
             .ok_or("the HDF5 file has groups that are not read; write it with h5py's default")?;
         let (tree, heap) = (table.data.number(0, 8)?, table.data.number(8, 8)?);
-        self.expect(heap, b"HEAP")?;
+        self.expect_signature(heap, b"HEAP")?;
         let names = self.number(heap + 24, 8)?;
         let mut objects = Vec::new();
         for leaf in self.leaves(tree, 0, 8)? {
-            self.expect(leaf.address, b"SNOD")?;
+            self.expect_signature(leaf.address, b"SNOD")?;
             for entry in 0..self.number(leaf.address + 6, 2)? {
                 let at = leaf.address + 8 + 40 * entry;
                 let start = names.saturating_add(self.number(at, 8)?);
                 let name = self
                     .0
-                    .get(usize::try_from(start).map_err(|_| cut())?..)
-                    .ok_or_else(cut)?;
+                    .get(usize::try_from(start).map_err(|_| truncated())?..)
+                    .ok_or_else(truncated)?;
                 let name = name.split(|byte| *byte == 0).next().unwrap_or_default();
                 objects.push(Object {
                     name: String::from_utf8_lossy(&name[..name.len().min(255)]).into_owned(),
@@ -186,26 +189,26 @@ impl<'a> Bytes<'a> {
         Ok(objects)
     }
 
-    /// The children of all lowest nodes of a tree of version 1, with their keys.
-    fn leaves(self, tree: u64, kind: u64, key: u64) -> Result<Vec<Leaf<'a>>, String> {
+    /// The entries of all leaf nodes of a version 1 B-tree, whose keys have `key_size` bytes.
+    fn leaves(self, tree: u64, kind: u64, key_size: u64) -> Result<Vec<Leaf<'a>>, String> {
         let (mut nodes, mut leaves, mut visited) = (vec![tree], Vec::new(), 0);
         while let Some(node) = nodes.pop() {
             visited += 1;
-            if visited > MOST_NODES || leaves.len() > MOST_NODES * 64 {
+            if visited > MAX_NODES || leaves.len() > MAX_NODES * 64 {
                 return Err("the HDF5 file is broken: one of its trees does not end".to_owned());
             }
-            self.expect(node, b"TREE")?;
+            self.expect_signature(node, b"TREE")?;
             if self.number(node + 4, 1)? != kind {
                 return Err(format!("the HDF5 file is broken at byte {node}"));
             }
             let level = self.number(node + 5, 1)?;
             for entry in 0..self.number(node + 6, 2)? {
-                let at = node + 24 + (key + 8) * entry;
-                let address = self.number(at + key, 8)?;
+                let at = node + 24 + (key_size + 8) * entry;
+                let address = self.number(at + key_size, 8)?;
                 if level > 0 {
                     nodes.push(address);
                 } else {
-                    let key = Bytes(self.part(at, key)?);
+                    let key = Bytes(self.slice(at, key_size)?);
                     leaves.push(Leaf { key, address });
                 }
             }
@@ -214,13 +217,13 @@ impl<'a> Bytes<'a> {
     }
 }
 
-/// A child of a lowest node.
+/// An entry of a leaf node.
 struct Leaf<'a> {
     key: Bytes<'a>,
     address: u64,
 }
 
-// Kinds of messages.
+// Types of header messages.
 const DATASPACE: u64 = 1;
 const DATATYPE: u64 = 3;
 const LAYOUT: u64 = 8;
@@ -228,31 +231,31 @@ const FILTERS: u64 = 11;
 const CONTINUATION: u64 = 16;
 const SYMBOL_TABLE: u64 = 17;
 
-/// A filter of chunks.
+/// A filter of the chunk pipeline.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Filter {
     Deflate,
     Shuffle,
-    /// Four bytes of a checksum at the end, which is not compared.
+    /// A checksum of four bytes at the end, which is not verified.
     Checksum,
 }
 
-/// Where the numbers of an array stand.
+/// Storage of the numbers of an array.
 #[derive(Debug)]
 enum Storage {
-    /// In one piece at an address.
-    Whole(u64),
-    /// In chunks of a height and a width, by a tree.
-    Chunks { tree: u64, chunk: (usize, usize) },
+    /// Contiguous, at an address.
+    Contiguous(u64),
+    /// Chunks of a height and width, listed in a B-tree.
+    Chunked { tree: u64, chunk: (usize, usize) },
 }
 
-/// The form of an array.
+/// Size, type and storage of an array.
 #[derive(Debug)]
 struct ArrayLayout {
     size: (usize, usize),
     descr: String,
-    /// The bytes of a number.
-    width: usize,
+    /// Size of a number, in bytes.
+    number_size: usize,
     storage: Storage,
     filters: Vec<Filter>,
 }
@@ -266,20 +269,21 @@ impl ArrayLayout {
                 .find(|message| message.kind == kind)
                 .map(|message| message.data)
         };
-        let lacking = || "the HDF5 file names something that is no array".to_owned();
-        let size = size(message(DATASPACE).ok_or_else(lacking)?)?;
-        let (descr, width) = number_type(message(DATATYPE).ok_or_else(lacking)?)?;
-        let layout = message(LAYOUT).ok_or_else(lacking)?;
+        let size = size(message(DATASPACE).ok_or_else(not_an_array)?)?;
+        let (descr, number_size) = number_type(message(DATATYPE).ok_or_else(not_an_array)?)?;
+        let layout = message(LAYOUT).ok_or_else(not_an_array)?;
         let storage = match (layout.number(0, 1)?, layout.number(1, 1)?) {
-            (3, 1) => Storage::Whole(layout.number(2, 8)?),
+            (3, 1) => Storage::Contiguous(layout.number(2, 8)?),
             (3, 2) => {
                 if layout.number(2, 1)? != 3 {
                     return Err("its chunks have other than two dimensions".to_owned());
                 }
-                let side = |at| layout.number(at, 4).map(|side| side as usize);
-                Storage::Chunks {
+                Storage::Chunked {
                     tree: layout.number(3, 8)?,
-                    chunk: (side(11)?, side(15)?),
+                    chunk: (
+                        layout.number(11, 4)? as usize,
+                        layout.number(15, 4)? as usize,
+                    ),
                 }
             }
             (version, class) => {
@@ -291,22 +295,18 @@ impl ArrayLayout {
         Ok(Self {
             size,
             descr,
-            width,
+            number_size,
             storage,
             filters: message(FILTERS).map_or_else(|| Ok(Vec::new()), filters)?,
         })
     }
 
-    fn array(self, file: &Bytes<'_>) -> Result<Hdf5Array, String> {
-        let Self {
-            size: (rows, columns),
-            width,
-            ..
-        } = self;
-        let bytes = rows * columns * width;
+    fn read_array(self, file: &Bytes<'_>) -> Result<Hdf5Array, String> {
+        let (rows, columns) = self.size;
+        let bytes = rows * columns * self.number_size;
         let data = match self.storage {
-            Storage::Whole(at) => file.part(at, bytes as u64)?.to_vec(),
-            Storage::Chunks { tree, chunk } => self.joined(file, tree, chunk)?,
+            Storage::Contiguous(at) => file.slice(at, bytes as u64)?.to_vec(),
+            Storage::Chunked { tree, chunk } => self.read_chunks(file, tree, chunk)?,
         };
         Ok(Hdf5Array {
             size: self.size,
@@ -315,41 +315,39 @@ impl ArrayLayout {
         })
     }
 
-    /// The numbers of all chunks, row by row.
-    fn joined(
+    /// Reads all chunks and returns the numbers row by row.
+    fn read_chunks(
         &self,
         file: &Bytes<'_>,
         tree: u64,
         chunk: (usize, usize),
     ) -> Result<Vec<u8>, String> {
-        let ((rows, columns), (height, breadth)) = (self.size, chunk);
-        let pixels = (height as u64).saturating_mul(breadth as u64);
-        if pixels == 0 || pixels > MOST_PIXELS {
+        let ((rows, columns), (chunk_height, chunk_width)) = (self.size, chunk);
+        let pixels = (chunk_height as u64).saturating_mul(chunk_width as u64);
+        if pixels == 0 || pixels > MAX_PIXELS {
             return Err("the HDF5 file is broken: the size of its chunks".to_owned());
         }
-        let (whole, mut filled) = (height * breadth * self.width, 0);
-        let mut data = vec![0; rows * columns * self.width];
-        // A key has the length of the chunk, the filters left out, and the place along each dimension and in a number.
+        let chunk_size = chunk_height * chunk_width * self.number_size;
+        let mut filled = 0;
+        let mut data = vec![0; rows * columns * self.number_size];
+        // A key contains the stored length of the chunk, a bit mask of skipped filters, and the offset along each dimension.
         for leaf in file.leaves(tree, 1, 32)? {
-            let place = |at| {
-                leaf.key
-                    .number(at, 8)
-                    .map(|place| usize::try_from(place).unwrap_or(usize::MAX))
-            };
-            let (top, left) = (place(8)?, place(16)?);
+            let (top, left) = (leaf.key.index(8)?, leaf.key.index(16)?);
             if top >= rows || left >= columns {
                 continue;
             }
-            let stored = file.part(leaf.address, leaf.key.number(0, 4)?)?;
-            let samples = self.unfiltered(stored, leaf.key.number(4, 4)?, whole)?;
-            let (high, wide) = (height.min(rows - top), breadth.min(columns - left));
-            for row in 0..high {
-                let from = row * breadth * self.width;
-                let to = ((top + row) * columns + left) * self.width;
-                let length = wide * self.width;
+            let stored = file.slice(leaf.address, leaf.key.number(0, 4)?)?;
+            let samples = self.undo_filters(stored, leaf.key.number(4, 4)?, chunk_size)?;
+            // Chunks at the edges reach beyond the array.
+            let height = chunk_height.min(rows - top);
+            let width = chunk_width.min(columns - left);
+            for row in 0..height {
+                let from = row * chunk_width * self.number_size;
+                let to = ((top + row) * columns + left) * self.number_size;
+                let length = width * self.number_size;
                 data[to..to + length].copy_from_slice(&samples[from..from + length]);
             }
-            filled += high * wide;
+            filled += height * width;
         }
         if filled == rows * columns {
             return Ok(data);
@@ -357,30 +355,40 @@ impl ArrayLayout {
         Err("not a whole HDF5 file: chunks of its array are missing".to_owned())
     }
 
-    /// The bytes of a chunk before its filters. Of `left_out`, a bit each, the filters were not used.
-    fn unfiltered(&self, stored: &[u8], left_out: u64, whole: usize) -> Result<Vec<u8>, String> {
+    /// Undoes the filters of a chunk and checks its length. Bit i of `skipped` is set if filter i was not used.
+    fn undo_filters(
+        &self,
+        stored: &[u8],
+        skipped: u64,
+        chunk_size: usize,
+    ) -> Result<Vec<u8>, String> {
         let mut bytes = stored.to_vec();
         for (_, filter) in self
             .filters
             .iter()
             .enumerate()
             .rev()
-            .filter(|(place, _)| left_out >> place & 1 == 0)
+            .filter(|(index, _)| skipped >> index & 1 == 0)
         {
             bytes = match filter {
                 Filter::Checksum => {
                     bytes.truncate(bytes.len().saturating_sub(4));
                     bytes
                 }
-                Filter::Deflate => inflated(&bytes, whole + 4)?,
-                Filter::Shuffle => unshuffled(&bytes, self.width),
+                Filter::Deflate => inflate(&bytes, chunk_size + 4)?,
+                Filter::Shuffle => unshuffle(&bytes, self.number_size),
             };
         }
-        if bytes.len() == whole {
+        if bytes.len() == chunk_size {
             return Ok(bytes);
         }
         Err("the HDF5 file is broken: a chunk has another length than it states".to_owned())
     }
+}
+
+/// The error for an object that is not an array.
+fn not_an_array() -> String {
+    "the HDF5 file names something that is no array".to_owned()
 }
 
 /// The height and width in a dataspace message.
@@ -394,15 +402,15 @@ fn size(message: Bytes<'_>) -> Result<(usize, usize), String> {
     }
     let (rows, columns) = (message.number(first, 8)?, message.number(first + 8, 8)?);
     let pixels = rows.saturating_mul(columns);
-    if pixels == 0 || pixels > MOST_PIXELS {
+    if pixels == 0 || pixels > MAX_PIXELS {
         return Err(format!(
-            "its array has {rows} × {columns} numbers; 1 to {MOST_PIXELS} expected"
+            "its array has {rows} × {columns} numbers; 1 to {MAX_PIXELS} expected"
         ));
     }
     Ok((rows as usize, columns as usize))
 }
 
-/// The type in a datatype message, as `.npy` files state it, and the bytes of a number.
+/// The number type in a datatype message, in the notation of `.npy` files, and its size in bytes.
 fn number_type(message: Bytes<'_>) -> Result<(String, usize), String> {
     let (class, bits, width) = (
         message.number(0, 1)? & 15,
@@ -422,7 +430,7 @@ fn number_type(message: Bytes<'_>) -> Result<(String, usize), String> {
     Ok((format!("{order}{letter}{width}"), width as usize))
 }
 
-/// The filters in a message, in the order in which they were used.
+/// The filters in a filter message, in the order in which the writer applied them.
 fn filters(message: Bytes<'_>) -> Result<Vec<Filter>, String> {
     let (version, count) = (message.number(0, 1)?, message.number(1, 1)?);
     let mut at = if version == 1 { 8 } else { 2 };
@@ -454,23 +462,22 @@ fn filters(message: Bytes<'_>) -> Result<Vec<Filter>, String> {
     Ok(filters)
 }
 
-/// Decompressed bytes, at most this many.
-fn inflated(bytes: &[u8], most: usize) -> Result<Vec<u8>, String> {
+/// Decompresses at most `max` + 1 bytes, so that the caller notices a larger chunk.
+fn inflate(bytes: &[u8], max: usize) -> Result<Vec<u8>, String> {
     let mut whole = Vec::new();
     flate2::read::ZlibDecoder::new(bytes)
-        .take(most as u64 + 1)
+        .take(max as u64 + 1)
         .read_to_end(&mut whole)
         .map_err(|_| "the HDF5 file is broken: a chunk cannot be decompressed".to_owned())?;
     Ok(whole)
 }
 
 /// Reverses the shuffle filter: the input has the first bytes of all numbers, then all second bytes, and so on.
-fn unshuffled(bytes: &[u8], width: usize) -> Vec<u8> {
-    let count = bytes.len() / width;
-    let numbers =
-        (0..count).flat_map(|number| (0..width).map(move |byte| bytes[byte * count + number]));
-    numbers
-        .chain(bytes[count * width..].iter().copied())
+fn unshuffle(bytes: &[u8], number_size: usize) -> Vec<u8> {
+    let count = bytes.len() / number_size;
+    (0..count)
+        .flat_map(|number| (0..number_size).map(move |byte| bytes[byte * count + number]))
+        .chain(bytes[count * number_size..].iter().copied())
         .collect()
 }
 

@@ -1,4 +1,4 @@
-//! An image file in memory: [`ImageFile`].
+//! Image files of six formats, and their conversion to pixels: [`ImageFile`].
 
 mod cmyk_jpeg;
 mod cmyk_tiff;
@@ -30,48 +30,49 @@ use darkqa_ground::types::{
     ColourHandling, ColourNote, DepthNote, Digest, InputNote, Light, Pixels, Rgb, Rgb16Image,
 };
 
-/// A PNG, JPEG, WebP, TIFF, BMP or OpenEXR file that is not decoded.
+/// A PNG, JPEG, WebP, TIFF, BMP or OpenEXR file in memory, not decoded.
 #[derive(Debug)]
 pub struct ImageFile {
     bytes: Vec<u8>,
     place: String,
     rule: ReadingRule,
-    turning: Turning,
-    /// Read from the header when they are first needed.
+    orientation_use: OrientationUse,
+    /// Facts from the headers, read on first use.
     facts: OnceLock<FileFacts>,
 }
 
-/// Whether an image is turned as the EXIF orientation of its file states.
+/// Use of the EXIF orientation of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Turning {
-    AsStated,
-    /// Never, because maps belong to the image as it is stored.
-    Never,
+enum OrientationUse {
+    /// Turn the image accordingly.
+    Apply,
+    /// Keep the image as stored, so that it matches its maps.
+    Ignore,
 }
 
-/// A turn that an image file states.
+/// The EXIF orientation of an image file that must be turned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct StatedTurn {
+pub struct StatedOrientation {
     /// EXIF orientation, 2 to 8.
     pub orientation: u8,
-    /// Height and width of the image before it is turned, in pixels.
-    pub stored: (usize, usize),
+    /// Height and width of the image as stored, in pixels.
+    pub stored_size: (usize, usize),
 }
 
 impl ImageFile {
-    /// The image file with these bytes. `place` is its path and line, for messages.
+    /// An image file with these bytes. `place` is its path, and line if any, for messages.
     #[must_use]
     pub fn new(bytes: Vec<u8>, place: String, rule: ReadingRule) -> Self {
         Self {
             bytes,
             place,
             rule,
-            turning: Turning::AsStated,
+            orientation_use: OrientationUse::Apply,
             facts: OnceLock::new(),
         }
     }
 
-    /// The file at a path.
+    /// Reads the file at a path.
     ///
     /// # Errors
     /// If it cannot be read.
@@ -80,41 +81,40 @@ impl ImageFile {
         Ok(Self::new(bytes, path.display().to_string(), rule))
     }
 
-    /// The same file, whose image is never turned.
+    /// The same file, decoded without applying its EXIF orientation.
     #[must_use]
-    pub fn never_turned(self) -> Self {
+    pub fn ignoring_orientation(self) -> Self {
         Self {
-            turning: Turning::Never,
+            orientation_use: OrientationUse::Ignore,
             ..self
         }
     }
 
-    /// The same file, whose image is turned as it states.
+    /// The same file, decoded with its EXIF orientation applied.
     #[must_use]
-    pub fn turned_as_stated(self) -> Self {
+    pub fn applying_orientation(self) -> Self {
         Self {
-            turning: Turning::AsStated,
+            orientation_use: OrientationUse::Apply,
             ..self
         }
     }
 
-    /// The turn that the file states, and its size as it is stored; `None` if it states none or is broken. Formats of light state no
-    /// turn.
+    /// The EXIF orientation of the file and its size as stored; `None` if the image need not be turned or the file is broken.
     #[must_use]
-    pub fn stated_turn(&self) -> Option<StatedTurn> {
+    pub fn stated_orientation(&self) -> Option<StatedOrientation> {
         let orientation = self.facts().orientation;
         if orientation == Orientation::NoTransforms {
             return None;
         }
-        // A broken image is named when it is decoded.
+        // Decoding reports a broken image.
         let (width, height) = self.decoder().ok()?.dimensions();
-        Some(StatedTurn {
+        Some(StatedOrientation {
             orientation: orientation.to_exif(),
-            stored: (height as usize, width as usize),
+            stored_size: (height as usize, width as usize),
         })
     }
 
-    /// The path and line of the file, for messages.
+    /// Path of the file, and line if any, for messages.
     #[must_use]
     pub fn place(&self) -> &str {
         &self.place
@@ -126,8 +126,7 @@ impl ImageFile {
         &self.bytes
     }
 
-    /// The digest of the file and of what its reading does besides taking the codes. Of an image whose codes are taken as
-    /// they are, it is the digest of the file.
+    /// The digest of the file and of the changes that reading makes to its codes. Without changes, the digest of the file alone.
     #[must_use]
     pub fn digest(&self) -> Digest {
         let file = Digest::from_bytes(&self.bytes);
@@ -143,16 +142,16 @@ impl ImageFile {
     #[must_use]
     pub fn note(&self) -> InputNote {
         let facts = self.facts();
-        let stated = facts.orientation;
-        let stated = (stated != Orientation::NoTransforms).then(|| stated.to_exif());
-        let (orientation, orientation_ignored) = match self.turning {
-            Turning::AsStated => (stated, None),
-            Turning::Never => (None, stated),
+        let stated =
+            (facts.orientation != Orientation::NoTransforms).then(|| facts.orientation.to_exif());
+        let (orientation, orientation_ignored) = match self.orientation_use {
+            OrientationUse::Apply => (stated, None),
+            OrientationUse::Ignore => (None, stated),
         };
-        let samples = self.samples(facts);
-        let depth = match (&samples, facts.depth) {
-            (Ok(Samples::Light(_)), _) => Some(DepthNote::Light),
-            (Ok(Samples::Codes(_)), Depth::Sixteen) => Some(DepthNote::Rgb16Image),
+        let interpretation = self.interpretation(facts);
+        let depth = match (&interpretation, facts.depth) {
+            (Ok(Interpretation::Light(_)), _) => Some(DepthNote::Light),
+            (Ok(Interpretation::Codes(_)), Depth::Sixteen) => Some(DepthNote::Rgb16Image),
             _ => None,
         };
         let is_light = depth == Some(DepthNote::Light);
@@ -162,11 +161,11 @@ impl ImageFile {
             first_of: facts.first_of.map(str::to_owned),
             colour: self.colour_note(facts),
             depth,
-            ..self.rule.note_of(is_light)
+            ..self.rule.input_note(is_light)
         }
     }
 
-    /// Handling of the file's colours; `None` if they are sRGB, or cannot be converted.
+    /// The colour space of the file and its handling; `None` for sRGB, and for colours that cannot be converted.
     fn colour_note(&self, facts: &FileFacts) -> Option<ColourNote> {
         let FileFacts { colour, depth, .. } = facts;
         if facts.inks.is_some() {
@@ -188,16 +187,16 @@ impl ImageFile {
         }
     }
 
-    /// Interpretation of the file's samples, by its colour information and by the rule.
+    /// Interpretation of the file's samples, by its colour information and the reading rule.
     ///
     /// # Errors
-    /// If it cannot be known, or the two contradict each other.
-    fn samples(&self, facts: &FileFacts) -> Result<Samples, String> {
+    /// If the colour space is not supported, or the file and the rule contradict each other.
+    fn interpretation(&self, facts: &FileFacts) -> Result<Interpretation, String> {
         let ReadingRule {
             colour, transfer, ..
         } = self.rule;
         if facts.inks.is_some() {
-            return Ok(Samples::Codes(None));
+            return Ok(Interpretation::Codes(None));
         }
         let meaning = match colour {
             ColourRule::Ignore => Meaning::Srgb,
@@ -205,29 +204,29 @@ impl ImageFile {
         };
         let is_linear = transfer == Transfer::Linear && facts.depth == Depth::Sixteen;
         Ok(match (meaning, facts.depth) {
-            (Meaning::Linear, _) | (Meaning::Srgb, Depth::Float) => Samples::Light(None),
-            (Meaning::Other(space), Depth::Float) => Samples::Light(Some(space)),
+            (Meaning::Linear, _) | (Meaning::Srgb, Depth::Float) => Interpretation::Light(None),
+            (Meaning::Other(space), Depth::Float) => Interpretation::Light(Some(space)),
             (Meaning::Srgb, _) if is_linear => {
                 if colour == ColourRule::Convert && facts.colour != ColourTag::None {
                     return Err(contradiction(&facts.colour));
                 }
-                Samples::Light(None)
+                Interpretation::Light(None)
             }
             (Meaning::Other(_), _) if is_linear => return Err(contradiction(&facts.colour)),
-            (Meaning::Srgb, _) => Samples::Codes(None),
-            (Meaning::Other(space), _) => Samples::Codes(Some(space)),
+            (Meaning::Srgb, _) => Interpretation::Codes(None),
+            (Meaning::Other(space), _) => Interpretation::Codes(Some(space)),
         })
     }
 
-    /// The usual ending of a name for the file: by its content, not by its own name.
+    /// The usual file name extension of the format, which is detected from the content.
     #[must_use]
-    pub fn ending(&self) -> &'static str {
-        FileFormat::detect(&self.bytes).map_or("", FileFormat::ending)
+    pub fn extension(&self) -> &'static str {
+        FileFormat::detect(&self.bytes).map_or("", FileFormat::extension)
     }
 
-    /// The width and height in pixels, after a check that the file can be decoded.
+    /// Checks that the file can be decoded; returns its width and height, in pixels.
     ///
-    /// For an RGB PNG the checksums are enough: they find any damage at a hundredth of the cost of decompressing. Every
+    /// For an RGB PNG file only the checksums are verified: they find any damage at a hundredth of the cost of decompression. Every
     /// other file is decoded, because JPEG has no checksums and an alpha channel may be transparent.
     pub fn check(&self) -> Result<(u32, u32)> {
         if FileFormat::detect(&self.bytes) == Ok(FileFormat::Png) {
@@ -235,7 +234,7 @@ impl ImageFile {
             if matches!(decoder.color_type(), ColorType::Rgb8 | ColorType::Rgb16) {
                 let (width, height) = decoder.dimensions();
                 self.check_complete()?;
-                self.samples_of(false)?;
+                self.checked_interpretation(false)?;
                 return Ok(match self.orientation().to_exif() {
                     5.. => (height, width),
                     _ => (width, height),
@@ -246,50 +245,48 @@ impl ImageFile {
         Ok((pixels.width() as u32, pixels.height() as u32))
     }
 
-    /// The pixels as 8-bit sRGB, as they are shown undarkened.
+    /// Decodes the file to 8-bit sRGB.
     ///
     /// # Errors
-    /// As of [`Self::pixels`].
+    /// See [`Self::pixels`].
     pub fn decode(&self) -> Result<Rgb> {
         let codes = self.pixels()?.codes();
         Ok(Arc::try_unwrap(codes).unwrap_or_else(|shared| (*shared).clone()))
     }
 
-    /// The pixels in the depth of the file. A truncated file, or a PNG with a wrong checksum, is refused.
+    /// Decodes the file in its own bit depth.
     ///
-    /// Grey becomes three equal channels, and a palette becomes its colours. An alpha channel is dropped if it is opaque
-    /// everywhere; transparency is refused, because there is no one right way to show it. The image is turned as its EXIF
-    /// orientation states, unless it has maps. Colours are converted to sRGB by the rule, inks by their profile, or by a formula
-    /// without one.
+    /// Grey becomes three equal channels, and a palette becomes its colours. An opaque alpha channel is dropped; transparency is refused,
+    /// because the background is unknown. The EXIF orientation is applied, unless the file was opened without it. Colours are converted to
+    /// sRGB if the rule asks for it, and CMYK by its profile or, without one, by a formula.
     ///
     /// # Errors
-    /// If the file is broken, or cannot be shown as it is; the error names the file.
+    /// If the file is truncated, damaged or unsupported; the error names the file.
     pub fn pixels(&self) -> Result<Pixels> {
         if FileFormat::detect(&self.bytes) == Ok(FileFormat::OpenExr) {
-            return self.light_of_layers();
+            return self.decode_exr();
         }
         if let Some(form) = self.facts().inks {
-            return self.pixels_of_inks(form);
+            return self.decode_cmyk(form);
         }
         let decoder = self.decoder()?;
-        // The PNG decoder stops after the last sample, and the JPEG decoder accepts fewer samples than it should.
+        // The PNG decoder stops after the last sample, and the JPEG decoder accepts missing samples.
         self.check_complete()?;
-        let decode = || {
-            let image = DynamicImage::from_decoder(decoder);
-            image.map_err(|e| format!("not a whole image: {e}"))
-        };
-        let mut image = guarded(decode).map_err(|problem| self.wrong(problem))?;
+        let mut image = guarded(|| {
+            DynamicImage::from_decoder(decoder).map_err(|e| format!("not a whole image: {e}"))
+        })
+        .map_err(|problem| self.error(problem))?;
         if image.color().has_alpha()
             && !image.to_rgba8().pixels().all(|pixel| pixel.0[3] == u8::MAX)
         {
-            return Err(self.wrong("the image is transparent in places; flatten it first"));
+            return Err(self.error("the image is transparent in places; flatten it first"));
         }
-        let samples = self.samples_of(!image.color().has_color())?;
+        let interpretation = self.checked_interpretation(!image.color().has_color())?;
         image.apply_orientation(self.orientation());
         let (width, height) = (image.width() as usize, image.height() as usize);
-        let is_deep = self.facts().depth == Depth::Sixteen;
-        let pixels = match samples {
-            Samples::Codes(space) if is_deep => {
+        let is_16_bit = self.facts().depth == Depth::Sixteen;
+        let pixels = match interpretation {
+            Interpretation::Codes(space) if is_16_bit => {
                 let mut codes = image.into_rgb16().into_raw();
                 if let Some(space) = space {
                     space.conversion.convert_16(&mut codes);
@@ -297,101 +294,100 @@ impl ImageFile {
                 Rgb16Image::new(height, width, codes)
                     .map(|codes| Pixels::Rgb16Image(Arc::new(codes)))
             }
-            Samples::Codes(space) => {
+            Interpretation::Codes(space) => {
                 let mut codes = image.into_rgb8().into_raw();
                 if let Some(space) = space {
                     space.conversion.convert_8(&mut codes);
                 }
                 Rgb::new(height, width, codes).map(|codes| Pixels::Codes8(Arc::new(codes)))
             }
-            Samples::Light(_) => {
+            Interpretation::Light(_) => {
                 let light = image
                     .into_rgb16()
                     .into_raw()
                     .into_iter()
-                    .map(|code| f32::from(code) / 65_535.0);
-                self.scaled_light(height, width, light.collect())
+                    .map(|code| f32::from(code) / 65_535.0)
+                    .collect();
+                self.light_pixels(height, width, light)
             }
         };
         pixels.map_err(|e| e.at(self.place.clone()))
     }
 
-    /// The pixels of a JPEG or TIFF file of four inks.
-    fn pixels_of_inks(&self, form: InkForm) -> Result<Pixels> {
+    /// Decodes a CMYK file (JPEG or TIFF).
+    fn decode_cmyk(&self, form: InkForm) -> Result<Pixels> {
         let (width, height) = self.decoder()?.dimensions();
         self.check_complete()?;
-        let read = || {
-            let colours = self.ink_colours()?;
-            let inks = guarded(|| match form {
-                InkForm::Tiff => cmyk_tiff::inks(&self.bytes, width as usize * height as usize),
-                InkForm::Plain | InkForm::Adobe => {
-                    cmyk_jpeg::inks(&self.bytes, form == InkForm::Adobe)
-                }
-            })?;
-            let image = RgbImage::from_raw(width, height, colours.srgb(&inks));
-            let mut image =
-                DynamicImage::from(image.ok_or("not a whole image: samples are missing")?);
-            image.apply_orientation(self.orientation());
-            let (width, height) = (image.width() as usize, image.height() as usize);
-            let codes = Rgb::new(height, width, image.into_rgb8().into_raw());
-            codes.map_err(|e| e.to_string())
-        };
-        let codes = read().map_err(|problem: String| self.wrong(problem))?;
+        let colours = self.ink_colours().map_err(|problem| self.error(problem))?;
+        let inks = guarded(|| match form {
+            InkForm::Tiff => cmyk_tiff::inks(&self.bytes, width as usize * height as usize),
+            InkForm::Plain | InkForm::Adobe => cmyk_jpeg::inks(&self.bytes, form == InkForm::Adobe),
+        })
+        .map_err(|problem| self.error(problem))?;
+        let image = RgbImage::from_raw(width, height, colours.srgb(&inks))
+            .ok_or_else(|| self.error("not a whole image: samples are missing"))?;
+        let mut image = DynamicImage::from(image);
+        image.apply_orientation(self.orientation());
+        let (width, height) = (image.width() as usize, image.height() as usize);
+        let codes =
+            Rgb::new(height, width, image.into_rgb8().into_raw()).map_err(|e| self.error(e))?;
         Ok(Pixels::Codes8(Arc::new(codes)))
     }
 
-    /// The colours of the inks of a file of four components.
+    /// The conversion of the inks of a CMYK file to sRGB.
     fn ink_colours(&self) -> Result<Inks, String> {
         guarded(|| Inks::new(&self.facts().colour, self.rule.colour))
     }
 
-    /// The pixels of an OpenEXR file.
-    fn light_of_layers(&self) -> Result<Pixels> {
-        let read = || {
-            let file = guarded(|| ExrFile::open(&self.bytes, &self.rule))?;
-            let samples = self.samples(self.facts())?;
-            let mut light = guarded(|| file.light(&self.bytes))?;
-            if let Samples::Light(Some(space)) = samples {
-                space.conversion.convert_light(&mut light);
-            }
-            let (width, height) = (file.size.0 as usize, file.size.1 as usize);
-            self.scaled_light(height, width, light)
-                .map_err(|e| e.to_string())
-        };
-        read().map_err(|problem| self.wrong(problem))
+    /// Decodes an OpenEXR file.
+    fn decode_exr(&self) -> Result<Pixels> {
+        let file = guarded(|| ExrFile::open(&self.bytes, &self.rule))
+            .map_err(|problem| self.error(problem))?;
+        let interpretation = self
+            .interpretation(self.facts())
+            .map_err(|problem| self.error(problem))?;
+        let mut light =
+            guarded(|| file.light(&self.bytes)).map_err(|problem| self.error(problem))?;
+        if let Interpretation::Light(Some(space)) = interpretation {
+            space.conversion.convert_light(&mut light);
+        }
+        let (width, height) = (file.size.0 as usize, file.size.1 as usize);
+        self.light_pixels(height, width, light)
+            .map_err(|e| self.error(e))
     }
 
-    /// Light after `--decode exposure`.
-    fn scaled_light(&self, height: usize, width: usize, light: Vec<f32>) -> Result<Pixels> {
+    /// Linear light as pixels, after `--decode exposure`.
+    fn light_pixels(&self, height: usize, width: usize, light: Vec<f32>) -> Result<Pixels> {
         let light = Arc::new(Light::new(height, width, light)?);
-        Ok(Pixels::Light(self.rule.scaled(light)))
+        Ok(Pixels::Light(self.rule.scale_exposure(light)))
     }
 
     /// Interpretation of the samples, after a check that a colour image has no grey profile.
-    fn samples_of(&self, is_grey: bool) -> Result<Samples> {
-        self.samples(self.facts())
-            .and_then(|samples| {
-                if let Samples::Codes(Some(space)) = &samples {
-                    space.check(is_grey)?;
-                }
-                Ok(samples)
-            })
-            .map_err(|problem| self.wrong(problem))
+    fn checked_interpretation(&self, is_grey: bool) -> Result<Interpretation> {
+        let interpretation = self
+            .interpretation(self.facts())
+            .map_err(|problem| self.error(problem))?;
+        if let Interpretation::Codes(Some(space)) = &interpretation {
+            space
+                .check(is_grey)
+                .map_err(|problem| self.error(problem))?;
+        }
+        Ok(interpretation)
     }
 
-    fn wrong(&self, problem: impl std::fmt::Display) -> Error {
+    fn error(&self, problem: impl std::fmt::Display) -> Error {
         Error::data(&self.place, problem)
     }
 
-    /// The orientation by which the image is turned.
+    /// The orientation to apply.
     fn orientation(&self) -> Orientation {
-        match self.turning {
-            Turning::AsStated => self.facts().orientation,
-            Turning::Never => Orientation::NoTransforms,
+        match self.orientation_use {
+            OrientationUse::Apply => self.facts().orientation,
+            OrientationUse::Ignore => Orientation::NoTransforms,
         }
     }
 
-    /// The facts of the file beside its pixels; of a file that is no image, none.
+    /// The facts from the headers of the file; [`FileFacts::NONE`] if the file is not an image.
     fn facts(&self) -> &FileFacts {
         self.facts
             .get_or_init(|| match FileFormat::detect(&self.bytes) {
@@ -400,40 +396,42 @@ impl ImageFile {
             })
     }
 
-    /// The decoder of a file of codes.
+    /// The decoder of a file of integer samples.
     fn decoder(&self) -> Result<impl ImageDecoder + '_> {
-        let format = FileFormat::detect(&self.bytes).map_err(|problem| self.wrong(problem))?;
-        if let Some(problem) = &self.facts().unshowable {
-            return Err(self.wrong(problem));
+        let format = FileFormat::detect(&self.bytes).map_err(|problem| self.error(problem))?;
+        if let Some(problem) = &self.facts().unsupported {
+            return Err(self.error(problem));
         }
-        let samples = match format {
-            FileFormat::Png => png_chunks::samples_alone(&self.bytes),
+        let bytes = match format {
+            FileFormat::Png => png_chunks::without_metadata(&self.bytes),
             _ => Cow::Borrowed(&*self.bytes),
         };
-        let mut reader = ImageReader::new(Cursor::new(samples));
+        let mut reader = ImageReader::new(Cursor::new(bytes));
         if let Some(format) = format.decoder() {
             reader.set_format(format);
         }
-        let most_pixels = self.rule.most_pixels;
         let mut limits = Limits::default();
-        limits.max_alloc = Some(most_pixels.saturating_mul(8));
+        // 8 bytes per pixel: RGBA with 16 bits per channel.
+        limits.max_alloc = Some(self.rule.max_pixels.saturating_mul(8));
         reader.limits(limits);
-        let open = || {
-            let decoder = reader.into_decoder();
-            decoder.map_err(|e| format!("not a readable image: {e}"))
-        };
-        let decoder = guarded(open).map_err(|problem| self.wrong(problem))?;
+        let decoder = guarded(|| {
+            reader
+                .into_decoder()
+                .map_err(|e| format!("not a readable image: {e}"))
+        })
+        .map_err(|problem| self.error(problem))?;
         let (width, height) = decoder.dimensions();
-        let size = self.rule.check_size(width as usize, height as usize);
-        size.map_err(|problem| self.wrong(problem))?;
+        self.rule
+            .check_size(width as usize, height as usize)
+            .map_err(|problem| self.error(problem))?;
         Ok(decoder)
     }
 
-    /// Checks that the file reaches its end, and that the checksums of a PNG are right.
+    /// Checks that the file is not truncated, and verifies the checksums of a PNG file.
     fn check_complete(&self) -> Result<()> {
         match FileFormat::detect(&self.bytes).map(|format| fault(&self.bytes, format, self.facts()))
         {
-            Ok(Some(fault)) => Err(self.wrong(format_args!(
+            Ok(Some(fault)) => Err(self.error(format_args!(
                 "not a whole image: {fault}; copy or export it again"
             ))),
             _ => Ok(()),
@@ -441,16 +439,16 @@ impl ImageFile {
     }
 }
 
-/// Interpretation of a file's samples, and the colours from which they are converted.
-enum Samples {
-    /// Codes, which are sRGB after the conversion.
+/// Interpretation of a file's samples, with the colour space to convert from; `None` for sRGB primaries and tone curve.
+enum Interpretation {
+    /// Codes, converted to sRGB codes.
     Codes(Option<Arc<ColourSpace>>),
-    /// Linear light.
+    /// Linear light, converted to the primaries of sRGB.
     Light(Option<Arc<ColourSpace>>),
 }
 
 impl Depth {
-    /// The bits of a code; of floats, which have none, it does not matter.
+    /// The bit depth of the codes; arbitrary for floats, which have none.
     fn code_depth(self) -> CodeDepth {
         match self {
             Self::Eight => CodeDepth::Eight,

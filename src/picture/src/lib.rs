@@ -1,11 +1,12 @@
-//! Images as files: read from any of six formats, scaled, and encoded for a request.
+//! Image files: six formats are decoded, scaled, and encoded for a request.
 //!
 //! ```text
-//! bytes ─ ImageFile ─ Pixels (8 or 16 bits, or light)        colours converted to sRGB, turned as EXIF states
-//! Rgb ─ Scaling ─ PayloadFormat ─ Payload ─ data URL         what a model receives
+//! bytes ─ ImageFile ─ Pixels (8 or 16 bits, or light)        converted to sRGB, EXIF orientation applied
+//! Rgb ─ Scaling ─ PayloadFormat ─ Payload ─ data URL         sent to a model
 //! ```
 //!
-//! An image without a file format, as a camera driver sends it, is a [`raw_image`]. Maps of numbers, which are not to be shown, are read as they are stored: [`raw_png`], [`npy`] and [`hdf5`].
+//! [`raw_image`] decodes images of camera drivers, which have no file format. [`raw_png`], [`npy`] and [`hdf5`] read maps of numbers, such
+//! as depth or labels.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test may panic"))]
 
@@ -28,7 +29,7 @@ pub use bilinear::bilinear;
 pub use encoding::{exr, grey_png, png};
 pub use fitting::{fit, fitted_size};
 pub use image_file::ImageFile;
-pub use payload::{Payload, pixels_of_url};
+pub use payload::{Payload, decode_data_url};
 pub use payload_format::{ImageArgs, PayloadFormat, Quality};
 pub use reading_rule::ReadingRule;
 pub use scaling::Scaling;

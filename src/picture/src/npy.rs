@@ -1,11 +1,11 @@
 //! Two-dimensional arrays in the `.npy` format of NumPy: [`Npy`].
 //!
-//! The format (`numpy.lib.format`): `\x93NUMPY`, a version, the length of the header, the header, and the numbers row by
+//! A file (`numpy.lib.format`) consists of `\x93NUMPY`, a version, the length of the header, the header, and the numbers row by
 //! row. The header is a Python dictionary with `descr`, `fortran_order` and `shape`. Versions 1 to 3 differ only in the
 //! width of the length field and the encoding of the header.
 //!
-//! The file is read in place: its size is known, so that a header that states more allocates nothing. `ndarray-npy` reads headers with
-//! a parser of all Python literals, in eight more crates.
+//! The numbers are not copied, so a header that states too large a shape allocates nothing. The crate `ndarray-npy` was not used because it
+//! parses headers as arbitrary Python literals and adds eight more crates.
 
 use std::sync::LazyLock;
 
@@ -14,7 +14,7 @@ use regex::Regex;
 /// The first six bytes of every `.npy` file.
 const MAGIC: &[u8] = b"\x93NUMPY";
 
-/// The dictionary in the header, with its keys in any order. The strings that are used here contain no escapes.
+/// Pattern of the dictionary in the header, with its keys in any order. Strings with escapes do not match.
 static HEADER: LazyLock<Option<Regex>> = LazyLock::new(|| {
     let pattern = r#"(?x) ^ \s* \{ (?: \s* ['"] (?:
             descr ['"] \s* : \s* ['"] (?<descr> [^'"]*) ['"]
@@ -24,7 +24,7 @@ static HEADER: LazyLock<Option<Regex>> = LazyLock::new(|| {
     Regex::new(pattern).ok()
 });
 
-/// The type of the numbers of a file, with a function that reads one number from its bytes.
+/// Type of the numbers of a file, with a function that converts the bytes of one number.
 #[derive(Debug, Clone, Copy)]
 enum NumberForm {
     Floats(fn(&[u8]) -> f64),
@@ -32,7 +32,7 @@ enum NumberForm {
 }
 
 impl NumberForm {
-    /// The size of one number in bytes, and its type; `None` unless `descr` is of one byte or little-endian.
+    /// The size of one number in bytes, and its type; `None` unless `descr` is a little-endian or one-byte type.
     fn from_descr(descr: &str) -> Option<(usize, Self)> {
         Some(match descr {
             "<f2" => (
@@ -54,7 +54,7 @@ impl NumberForm {
     }
 }
 
-/// The bytes of one number. A chunk always has the size of its type.
+/// The bytes of one number as an array. A chunk always has the size of its type.
 fn sized<const N: usize>(chunk: &[u8]) -> [u8; N] {
     chunk.first_chunk().copied().unwrap_or([0; N])
 }
@@ -63,8 +63,8 @@ fn sized<const N: usize>(chunk: &[u8]) -> [u8; N] {
 #[derive(Debug, Clone, Copy)]
 pub struct Npy<'a> {
     numbers: NumberForm,
-    /// The size of a number in bytes.
-    width: usize,
+    /// Size of a number, in bytes.
+    number_size: usize,
     /// Height and width of the array (rows, columns).
     pub size: (usize, usize),
     data: &'a [u8],
@@ -76,7 +76,7 @@ impl<'a> Npy<'a> {
         let rest = bytes
             .strip_prefix(MAGIC)
             .ok_or("not a .npy file: it does not begin with \\x93NUMPY")?;
-        let (header, data) = split(rest)?;
+        let (header, data) = split_header(rest)?;
         let header = String::from_utf8_lossy(header);
         let (descr, fortran, shape) = fields(&header).ok_or_else(|| {
             let header = header.trim_end();
@@ -90,23 +90,26 @@ impl<'a> Npy<'a> {
         let [rows, columns] = shape[..] else {
             return Err(format!("its shape is {shape:?}; [height, width] expected"));
         };
-        Self::new(descr, (rows, columns), data)
+        Self::new(descr, rows, columns, data)
     }
 
-    /// The numbers of a type, row by row, of an array of this height and width.
+    /// An array of this size in `data`, row by row. `descr` is the type of the numbers.
     ///
     /// # Errors
-    /// If the type is none that is read, or a number is missing.
+    /// If the type is not supported, or `data` has another length than the array.
     pub(crate) fn new(
         descr: &str,
-        (rows, columns): (usize, usize),
+        rows: usize,
+        columns: usize,
         data: &'a [u8],
     ) -> Result<Self, String> {
-        let (width, numbers) = NumberForm::from_descr(descr).ok_or_else(|| {
+        let (number_size, numbers) = NumberForm::from_descr(descr).ok_or_else(|| {
             format!("its numbers are {descr:?}; little-endian integers or floats of 2, 4 or 8 bytes expected")
         })?;
-        let count = rows.checked_mul(columns);
-        if count.and_then(|count| count.checked_mul(width)) != Some(data.len()) {
+        let length = rows
+            .checked_mul(columns)
+            .and_then(|count| count.checked_mul(number_size));
+        if length != Some(data.len()) {
             return Err(format!(
                 "not a whole .npy file: {} bytes follow its header, which do not make {rows} × {columns} {descr:?}",
                 data.len()
@@ -114,34 +117,33 @@ impl<'a> Npy<'a> {
         }
         Ok(Self {
             numbers,
-            width,
+            number_size,
             size: (rows, columns),
             data,
         })
     }
 
-    /// The floating-point numbers, row by row; an error if the file holds integers.
+    /// The floating-point numbers, row by row; an error for integers.
     pub fn floats(self) -> Result<impl Iterator<Item = f64>, String> {
         match self.numbers {
-            NumberForm::Floats(read) => Ok(self.data.chunks_exact(self.width).map(read)),
+            NumberForm::Floats(read) => Ok(self.data.chunks_exact(self.number_size).map(read)),
             NumberForm::Integers(_) => {
                 Err("it holds integers; floats of 2, 4 or 8 bytes expected".to_owned())
             }
         }
     }
 
-    /// The integers, row by row; an error if the file holds floating-point numbers.
+    /// The integers, row by row; an error for floating-point numbers.
     pub fn integers(self) -> Result<impl Iterator<Item = i128>, String> {
         match self.numbers {
-            NumberForm::Integers(read) => Ok(self.data.chunks_exact(self.width).map(read)),
+            NumberForm::Integers(read) => Ok(self.data.chunks_exact(self.number_size).map(read)),
             NumberForm::Floats(_) => Err("it holds floats; integers expected".to_owned()),
         }
     }
 }
 
-/// The header and the data: the two parts after the first six bytes.
-fn split(rest: &[u8]) -> Result<(&[u8], &[u8]), String> {
-    let truncated = || "not a whole .npy file: it ends within its header".to_owned();
+/// Splits the bytes after the magic number into header and data.
+fn split_header(rest: &[u8]) -> Result<(&[u8], &[u8]), String> {
     let (&[major, _minor], rest) = rest.split_first_chunk().ok_or_else(truncated)?;
     let (length, rest) = match major {
         1 => {
@@ -161,13 +163,23 @@ fn split(rest: &[u8]) -> Result<(&[u8], &[u8]), String> {
     rest.split_at_checked(length).ok_or_else(truncated)
 }
 
-/// The fields of a header: the type of the numbers, whether columns come first, and the shape.
+/// The fields of a header: `descr`, `fortran_order` and `shape`.
 fn fields(header: &str) -> Option<(&str, &str, Vec<usize>)> {
     let found = HEADER.as_ref()?.captures(header)?;
-    let field = |name| Some(found.name(name)?.as_str());
-    let sides = field("shape")?.trim().split_terminator(',');
-    let shape: Option<Vec<usize>> = sides.map(|side| side.trim().parse().ok()).collect();
-    Some((field("descr")?, field("fortran")?, shape?))
+    let descr = found.name("descr")?.as_str();
+    let fortran = found.name("fortran")?.as_str();
+    let shape = found
+        .name("shape")?
+        .as_str()
+        .trim()
+        .split_terminator(',')
+        .map(|side| side.trim().parse().ok())
+        .collect::<Option<Vec<usize>>>()?;
+    Some((descr, fortran, shape))
+}
+
+fn truncated() -> String {
+    "not a whole .npy file: it ends within its header".to_owned()
 }
 
 #[cfg(test)]

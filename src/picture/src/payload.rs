@@ -21,14 +21,14 @@ use darkqa_ground::types::{Digest, ExposureFacts, ImageFacts, PairFacts, Rgb};
 pub struct Payload {
     facts: ImageFacts,
     file: Bytes,
-    /// The file as a data URL, encoded when it is first sent.
+    /// The file as a data URL, encoded on first use.
     data_url: OnceLock<Bytes>,
     /// The pixels, decoded when a model of this process first looks at them; `Some(None)` if that failed.
     pixels: OnceLock<Option<Arc<Rgb>>>,
 }
 
 impl Payload {
-    /// Encodes an image in its size.
+    /// Encodes an image without scaling.
     ///
     /// # Errors
     /// If the image is larger than the format allows.
@@ -38,22 +38,25 @@ impl Payload {
             PayloadFormat::Png => png(image)?,
             PayloadFormat::Jpeg(quality) => jpeg(image.samples(), width, height, quality)?,
         };
-        Ok(Self::from_file(file, (width, height), format))
+        Ok(Self::from_file(file, width, height, format))
     }
 
-    /// The bytes of a PNG file, without decoding or encoding. The file must have plain 8-bit RGB, and no chunk that changes its display or
-    /// adds information. `None` for every other file.
-    ///
-    /// The file is not checked for damage: it must have been decoded before.
+    /// Takes a PNG file unchanged if it contains only plain 8-bit RGB pixels and no chunk that changes their display or adds information;
+    /// otherwise returns `None`. The file is not checked for damage: it must have been decoded before.
     #[must_use]
     pub fn from_plain_png(file: &[u8]) -> Option<Self> {
-        let size = plain_png::size(file)?;
-        Some(Self::from_file(file.to_vec(), size, PayloadFormat::Png))
+        let (width, height) = plain_png::plain_size(file)?;
+        Some(Self::from_file(
+            file.to_vec(),
+            width,
+            height,
+            PayloadFormat::Png,
+        ))
     }
 
-    /// The payload of a file that was encoded in this format, with its width and height in pixels.
+    /// A file that was encoded in this format, with its width and height in pixels.
     #[must_use]
-    pub fn from_file(file: Vec<u8>, (width, height): (u32, u32), format: PayloadFormat) -> Self {
+    pub fn from_file(file: Vec<u8>, width: u32, height: u32, format: PayloadFormat) -> Self {
         Self {
             facts: ImageFacts {
                 digest: Digest::from_bytes(&file),
@@ -71,34 +74,34 @@ impl Payload {
         }
     }
 
-    /// The same payload, of a frame that was turned by this EXIF orientation when its file was read.
+    /// Adds the EXIF orientation that was applied when the frame was read.
     #[must_use]
-    pub fn turned_by(mut self, orientation: Option<u8>) -> Self {
+    pub fn with_orientation(mut self, orientation: Option<u8>) -> Self {
         self.facts.orientation = orientation;
         self
     }
 
-    /// The image, with the camera settings of its exposure.
+    /// Adds the camera's exposure.
     #[must_use]
-    pub fn exposed_by(mut self, exposure: Option<ExposureFacts>) -> Self {
+    pub fn with_exposure(mut self, exposure: Option<ExposureFacts>) -> Self {
         self.facts.exposure = exposure;
         self
     }
 
-    /// The image with the darkness of the photograph of its frame.
+    /// Adds how dark the photograph of the frame is.
     #[must_use]
-    pub fn paired_by(mut self, pair: Option<PairFacts>) -> Self {
+    pub fn with_pair(mut self, pair: Option<PairFacts>) -> Self {
         self.facts.pair = pair;
         self
     }
 
-    /// The facts for the record: digest and size of the encoded file, width, height and format.
+    /// Facts for the record: digest and length of the file, width, height, format, and the added facts.
     #[must_use]
     pub fn facts(&self) -> &ImageFacts {
         &self.facts
     }
 
-    /// The digest of images that are sent together, as in a record; `None` of none.
+    /// The digest of images that are sent together, as in a record; `None` without images.
     pub fn joint_digest(images: &[Arc<Self>]) -> Option<Digest> {
         Digest::from_file_digests(images.iter().map(|image| image.facts.digest))
     }
@@ -109,7 +112,7 @@ impl Payload {
         (self.facts.width, self.facts.height)
     }
 
-    /// Extension of a name for the file, without the dot.
+    /// Extension for a file name, without the dot.
     #[must_use]
     pub fn extension(&self) -> &'static str {
         if self.facts.format == PayloadFormat::Png.name() {
@@ -125,10 +128,10 @@ impl Payload {
         &self.file
     }
 
-    /// The pixels as the receiver of the image decodes them.
+    /// Decodes the file, as its receiver does.
     ///
     /// # Errors
-    /// Only if memory is short: the file was encoded here.
+    /// If memory is insufficient, or the file of [`Self::from_file`] is damaged.
     pub fn decode(&self) -> Result<Rgb> {
         let image = image::load_from_memory(&self.file)
             .map_err(image_error)?
@@ -137,10 +140,10 @@ impl Payload {
         Rgb::new(height, width, image.into_raw())
     }
 
-    /// The pixels as by [`Self::decode`], decoded once and kept as long as the payload, for several models of this process.
+    /// The pixels that the receiver gets, decoded once and kept as long as the payload, for several models of this process.
     ///
     /// # Errors
-    /// As of [`Self::decode`].
+    /// See [`Self::decode`].
     pub fn shared_pixels(&self) -> Result<Arc<Rgb>> {
         let decode = || self.decode().map(Arc::new);
         match self.pixels.get_or_init(|| decode().ok()) {
@@ -149,11 +152,11 @@ impl Payload {
         }
     }
 
-    /// The pixels as by [`Self::decode`]; a lossless payload whose pixels are passed in is not decoded.
+    /// The pixels that the receiver gets. If the encoded pixels are passed in, a lossless payload is not decoded.
     ///
     /// # Errors
-    /// As of [`Self::decode`].
-    pub fn received<'a>(&self, encoded: Option<&'a Rgb>) -> Result<Cow<'a, Rgb>> {
+    /// See [`Self::decode`].
+    pub fn received_pixels<'a>(&self, encoded: Option<&'a Rgb>) -> Result<Cow<'a, Rgb>> {
         match encoded {
             Some(pixels) if self.facts.format == PayloadFormat::Png.name() => {
                 Ok(Cow::Borrowed(pixels))
@@ -182,17 +185,18 @@ impl fmt::Debug for Payload {
     }
 }
 
-/// The pixels of a JPEG in a `data:` URL, as a run stores small copies.
+/// Decodes a JPEG in a `data:` URL, the form in which a run stores thumbnails.
 ///
 /// # Errors
-/// If the text is no such URL, the file is no whole JPEG, or a side has more than `most` pixels.
-pub fn pixels_of_url(url: &str, most: u32) -> Result<Rgb> {
-    let base64 = url.strip_prefix("data:image/jpeg;base64,");
-    let base64 = base64.ok_or_else(|| image_error("no JPEG as a run stores it"))?;
+/// If the text is not such a URL, the file is not a complete JPEG, or a side has more than `max_side` pixels.
+pub fn decode_data_url(url: &str, max_side: u32) -> Result<Rgb> {
+    let base64 = url
+        .strip_prefix("data:image/jpeg;base64,")
+        .ok_or_else(|| image_error("no JPEG as a run stores it"))?;
     let file = STANDARD.decode(base64).map_err(image_error)?;
     let mut reader = ImageReader::with_format(Cursor::new(file), ImageFormat::Jpeg);
     let mut limits = Limits::default();
-    (limits.max_image_width, limits.max_image_height) = (Some(most), Some(most));
+    (limits.max_image_width, limits.max_image_height) = (Some(max_side), Some(max_side));
     reader.limits(limits);
     let image = reader.decode().map_err(image_error)?.into_rgb8();
     let (height, width) = (image.height() as usize, image.width() as usize);
@@ -209,7 +213,7 @@ mod tests {
         Rgb::new(height, width, samples.collect()).unwrap()
     }
 
-    /// The file that the data URL of a payload holds.
+    /// The file in the data URL of a payload.
     fn file(payload: &Payload) -> Vec<u8> {
         let url = payload.data_url();
         let url = std::str::from_utf8(&url).unwrap();
@@ -222,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn png_is_lossless_and_its_facts_are_right() {
+    fn png_is_lossless_with_correct_facts() {
         let image = noise(5, 7);
         let payload = Payload::encode(&image, PayloadFormat::Png).unwrap();
         let file = file(&payload);
@@ -256,7 +260,7 @@ mod tests {
     }
 
     #[test]
-    fn plain_files_are_sent_as_they_are() {
+    fn plain_files_are_sent_unchanged() {
         let image = noise(8, 9);
         let encoded = Payload::encode(&image, PayloadFormat::Png).unwrap();
         let bytes = file(&encoded);

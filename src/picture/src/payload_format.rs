@@ -7,12 +7,12 @@ use clap::Args;
 
 use darkqa_ground::types::Decides;
 
-/// The file format in which images are sent: PNG or JPEG, because servers refuse others.
+/// The file format in which images are sent: PNG or JPEG, because servers refuse other formats.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PayloadFormat {
     /// Lossless: the model receives exactly the pixels that were made.
     Png,
-    /// Smaller, without chroma subsampling; it loses the noise in dark areas first.
+    /// Smaller, without chroma subsampling. Compression removes the noise of dark areas first.
     Jpeg(Quality),
 }
 
@@ -38,7 +38,7 @@ impl Quality {
 }
 
 impl PayloadFormat {
-    /// The subtype of the format's media type `image/…`.
+    /// The subtype of the media type `image/…`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Png => "png",
@@ -77,7 +77,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn formats_read_back() {
+    fn formats_parse_their_own_text() {
         for text in ["png", "jpeg:1", "jpeg:95", "jpeg:100"] {
             assert_eq!(text.parse::<PayloadFormat>().unwrap().to_string(), text);
         }

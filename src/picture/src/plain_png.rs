@@ -1,11 +1,12 @@
-//! The check that a PNG file has nothing but plain pixels: [`size`].
+//! The check that a PNG file contains nothing but plain 8-bit RGB pixels: [`plain_size`].
 
 const SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
 
-/// Width and height of a PNG file with plain 8-bit RGB: one header, image data, an end, and at most chunks that change nothing
-/// (`sRGB`, and `pHYs` with square pixels). `None` for all other files: further chunks (transparency, gamma, profiles,
-/// orientation, frames, text) could change how the image is shown, or give the endpoint more than the pixels.
-pub(super) fn size(file: &[u8]) -> Option<(u32, u32)> {
+/// Width and height of a PNG file that contains only plain 8-bit RGB pixels, in pixels; `None` for other files.
+///
+/// Besides header, image data and end, only chunks without effect are accepted (`sRGB`, and `pHYs` with square pixels). Other chunks
+/// (transparency, gamma, profiles, orientation, frames, text) could change the display, or send more than the pixels.
+pub(super) fn plain_size(file: &[u8]) -> Option<(u32, u32)> {
     let mut rest = file.strip_prefix(SIGNATURE)?;
     let (first, header, after) = chunk(rest)?;
     if &first != b"IHDR" {
@@ -34,12 +35,12 @@ fn plain_header(header: &[u8]) -> Option<(u32, u32)> {
     let (height, rest) = rest.split_first_chunk::<4>()?;
     let size = (u32::from_be_bytes(*width), u32::from_be_bytes(*height));
     // Bit depth 8, colour type 2 (RGB), the only compression and filter methods that exist, no interlacing.
-    let plain = rest == [8, 2, 0, 0, 0] && size.0 > 0 && size.1 > 0;
-    plain.then_some(size)
+    let is_plain = rest == [8, 2, 0, 0, 0] && size.0 > 0 && size.1 > 0;
+    is_plain.then_some(size)
 }
 
-/// The kind and content of the first chunk, and the bytes after it; `None` if the file ends too early. Checksums are not
-/// verified: the caller has decoded the file before.
+/// The type and content of the first chunk, and the bytes after it; `None` if the file ends too early. Checksums are not
+/// verified, because the caller has decoded the file before.
 fn chunk(bytes: &[u8]) -> Option<([u8; 4], &[u8], &[u8])> {
     let (length, rest) = bytes.split_first_chunk::<4>()?;
     let (kind, rest) = rest.split_first_chunk::<4>()?;
@@ -81,11 +82,11 @@ mod tests {
             (b"IDAT", &[2; 9]),
             (b"IEND", &[]),
         ]);
-        assert_eq!(size(&file), Some((6, 4)));
+        assert_eq!(plain_size(&file), Some((6, 4)));
         for length in 0..file.len() {
-            assert_eq!(size(&file[..length]), None, "cut at {length}");
+            assert_eq!(plain_size(&file[..length]), None, "cut at {length}");
         }
-        assert_eq!(size(&[&file[..], b"x"].concat()), None);
+        assert_eq!(plain_size(&[&file[..], b"x"].concat()), None);
     }
 
     #[test]
@@ -102,7 +103,7 @@ mod tests {
                 (b"IDAT", &[1; 9]),
                 (b"IEND", &[]),
             ]);
-            assert_eq!(size(&file), None, "{other:?}");
+            assert_eq!(plain_size(&file), None, "{other:?}");
         }
         let rgb = header([8, 2, 0, 0, 0]);
         for kind in [
@@ -115,12 +116,12 @@ mod tests {
                 (b"IDAT", &[1; 9]),
                 (b"IEND", &[]),
             ]);
-            assert_eq!(size(&file), None, "{}", String::from_utf8_lossy(kind));
+            assert_eq!(plain_size(&file), None, "{}", String::from_utf8_lossy(kind));
         }
-        assert_eq!(size(&png(&[(b"IHDR", &rgb), (b"IEND", &[])])), None);
-        assert_eq!(size(&png(&[(b"IDAT", &[1]), (b"IEND", &[])])), None);
+        assert_eq!(plain_size(&png(&[(b"IHDR", &rgb), (b"IEND", &[])])), None);
+        assert_eq!(plain_size(&png(&[(b"IDAT", &[1]), (b"IEND", &[])])), None);
         let mut endless = png(&[(b"IHDR", &rgb)]);
         endless.extend(b"\xff\xff\xff\xffIDAT");
-        assert_eq!(size(&endless), None);
+        assert_eq!(plain_size(&endless), None);
     }
 }

@@ -1,4 +1,4 @@
-//! An image as a camera driver sends it: samples in rows, without a file format ([`RawImage`]).
+//! Uncompressed image of a camera driver, without a file format: [`RawImage`].
 
 mod layout;
 mod mosaic;
@@ -11,26 +11,26 @@ use darkqa_ground::types::{Image, Rgb, Rgb16Image};
 use self::layout::{Depth, Layout, Order};
 use self::mosaic::{RawSample, demosaic};
 use super::encoding::{png, png_16};
-use super::reading_rule::MOST_PIXELS;
+use super::reading_rule::MAX_PIXELS;
 
-/// An uncompressed image of a camera driver. The names of encodings are those of ROS (`sensor_msgs/image_encodings.hpp`).
+/// Uncompressed image of a camera driver. Encodings have the names of ROS (`sensor_msgs/image_encodings.hpp`).
 #[derive(Debug, Clone)]
 pub struct RawImage<'a> {
     /// Width in pixels.
     pub width: usize,
     /// Height in pixels.
     pub height: usize,
-    /// Bytes from the start of a row to the start of the next; rows may end with padding.
+    /// Bytes from the start of one row to the start of the next; rows may end with padding.
     pub step: usize,
     /// Name of the encoding, such as `bgr8` or `bayer_rggb16`.
     pub encoding: String,
-    /// Whether samples of 16 bits have their high byte first.
+    /// True if 16-bit samples have their high byte first.
     pub is_big_endian: bool,
-    /// The rows.
+    /// The rows, with their padding.
     pub data: Cow<'a, [u8]>,
 }
 
-/// The pixels of a raw image, in the depth of its samples.
+/// The pixels of a raw image, in the bit depth of its samples.
 #[derive(Debug, PartialEq, Eq)]
 pub enum RawPixels {
     /// 8-bit codes.
@@ -48,7 +48,7 @@ impl RawPixels {
         }
     }
 
-    /// The greatest sample of an image of 16 bits; `None` for 8 bits.
+    /// The largest sample of a 16-bit image; `None` for 8 bits.
     pub fn peak_16(&self) -> Option<u16> {
         match self {
             Self::Codes8(_) => None,
@@ -56,7 +56,7 @@ impl RawPixels {
         }
     }
 
-    /// Scales an image of 16 bits so that `white` becomes 65535; larger codes are clipped. Images of 8 bits do not change.
+    /// Scales a 16-bit image so that `white` becomes 65535, and clips larger codes. Images of 8 bits do not change.
     #[must_use]
     pub fn with_white(self, white: u16) -> Self {
         let Self::Rgb16Image(mut image) = self else {
@@ -70,7 +70,7 @@ impl RawPixels {
         Self::Rgb16Image(image)
     }
 
-    /// The image as a lossless PNG file of its depth.
+    /// Encodes the image as a PNG file of the same bit depth.
     ///
     /// # Errors
     /// If a side is too long for the format.
@@ -83,12 +83,12 @@ impl RawPixels {
 }
 
 impl RawImage<'_> {
-    /// The pixels as RGB: grey becomes three equal channels, alpha is dropped, and a mosaic is interpolated bilinearly.
+    /// Converts the image to RGB: grey becomes three equal channels, alpha is dropped, and a mosaic is interpolated bilinearly.
     ///
     /// # Errors
-    /// If the encoding is unknown, or the data do not fit the size.
+    /// If the encoding is unknown, or the data are shorter than the size requires.
     pub fn decode(&self) -> Result<RawPixels, String> {
-        let layout = Layout::named(&self.encoding)?;
+        let layout = Layout::from_encoding(&self.encoding)?;
         let rows = self.rows(layout)?;
         let pixels = match layout.depth {
             Depth::Eight => RawPixels::Codes8(self.image(layout, rows, |row, samples| {
@@ -116,9 +116,9 @@ impl RawImage<'_> {
             ..
         } = *self;
         let pixels = (width as u64).saturating_mul(height as u64);
-        if pixels == 0 || pixels > MOST_PIXELS {
+        if pixels == 0 || pixels > MAX_PIXELS {
             return Err(format!(
-                "{width} × {height} pixels; 1 to {MOST_PIXELS} pixels expected"
+                "{width} × {height} pixels; 1 to {MAX_PIXELS} pixels expected"
             ));
         }
         let row = width * layout.channels * layout.depth.bytes();
@@ -138,7 +138,7 @@ impl RawImage<'_> {
         Ok(data.chunks(step).take(height).map(move |line| &line[..row]))
     }
 
-    /// The image from samples that `read` takes from each row.
+    /// Builds the image. `read` appends the samples of one row to a buffer.
     fn image<'a, T: RawSample>(
         &self,
         layout: Layout,
@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn channels_come_out_as_rgb() {
+    fn channels_are_reordered_to_rgb() {
         assert_eq!(samples_8("rgb8", &[1, 2, 3, 4, 5, 6]), [1, 2, 3, 4, 5, 6]);
         assert_eq!(samples_8("bgr8", &[1, 2, 3, 4, 5, 6]), [3, 2, 1, 6, 5, 4]);
         assert_eq!(samples_8("8UC3", &[1, 2, 3, 4, 5, 6]), [3, 2, 1, 6, 5, 4]);

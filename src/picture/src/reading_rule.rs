@@ -7,60 +7,60 @@ use clap::ValueEnum;
 use darkqa_ground::types::flags::flag_words;
 use darkqa_ground::types::{DepthNote, InputNote, Light};
 
-/// The default of the maximum number of pixels in an image (chosen).
-pub const MOST_PIXELS: u64 = 100_000_000;
+/// Default maximum number of pixels in an image (chosen).
+pub const MAX_PIXELS: u64 = 100_000_000;
 
-/// How many times as long as the other a side of an image may be (chosen).
-const MOST_ASPECT: usize = 1000;
+/// Maximum ratio of the longer to the shorter side of an image (chosen).
+const MAX_ASPECT_RATIO: usize = 1000;
 
 /// The settings that decide how image files are read.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ReadingRule {
-    /// The maximum number of pixels. A larger image is refused before it is decompressed.
-    pub most_pixels: u64,
+    /// Maximum number of pixels. A larger image is refused before it is decompressed.
+    pub max_pixels: u64,
     /// Handling of colours that are not sRGB.
     pub colour: ColourRule,
     /// Interpretation of the samples of 16-bit PNG and TIFF images.
     pub transfer: Transfer,
-    /// By how many EV linear light is scaled when it is read.
+    /// Gain applied to linear light, in EV; `None` for none.
     pub exposure_ev: Option<f32>,
 }
 
 impl ReadingRule {
-    /// The default without a limit, for files whose facts alone are read.
+    /// The default without a limit, for files of which only the headers are read.
     pub(super) const UNBOUNDED: Self = Self {
-        most_pixels: u64::MAX,
+        max_pixels: u64::MAX,
         colour: ColourRule::Convert,
         transfer: Transfer::Srgb,
         exposure_ev: None,
     };
 
-    /// Checks the width and the height of an image. One whose sides differ too much makes others that take more memory than any image of
-    /// as many pixels.
+    /// Checks the width and height of an image, in pixels. The aspect ratio is limited because scaling a very narrow image can take far
+    /// more memory than the image itself.
     ///
     /// # Errors
-    /// If it has too many pixels, or without a limit of the user's own sides that differ too much.
+    /// If it has too many pixels, or if `max_pixels` is the default and the aspect ratio is too large.
     pub(super) fn check_size(&self, width: usize, height: usize) -> Result<(), String> {
         let pixels = (width as u64).saturating_mul(height as u64);
-        if pixels > self.most_pixels {
+        if pixels > self.max_pixels {
             return Err(format!(
                 "{width} × {height} pixels are more than the {} that are read; shrink it first, or raise --decode max-pixels",
-                self.most_pixels
+                self.max_pixels
             ));
         }
-        let is_narrow = width.max(height) > MOST_ASPECT * width.min(height);
-        if is_narrow && self.most_pixels == MOST_PIXELS {
+        let is_narrow = width.max(height) > MAX_ASPECT_RATIO * width.min(height);
+        if is_narrow && self.max_pixels == MAX_PIXELS {
             return Err(format!(
-                "{width} × {height} pixels: one side is more than {MOST_ASPECT} times the other; cut it, or set --decode max-pixels={}",
-                MOST_PIXELS - 1
+                "{width} × {height} pixels: one side is more than {MAX_ASPECT_RATIO} times the other; cut it, or set --decode max-pixels={}",
+                MAX_PIXELS - 1
             ));
         }
         Ok(())
     }
 
-    /// Changes that reading makes to an image, other than those of colours and orientation. `is_light` tells linear light from 8-bit codes.
+    /// Changes that reading makes to an image, except colours and orientation. `is_light` is true for linear light, false for codes.
     #[must_use]
-    pub fn note_of(&self, is_light: bool) -> InputNote {
+    pub fn input_note(&self, is_light: bool) -> InputNote {
         InputNote {
             depth: is_light.then_some(DepthNote::Light),
             exposure_ev: self.exposure_ev.filter(|_| is_light),
@@ -73,9 +73,9 @@ impl ReadingRule {
         }
     }
 
-    /// Light after `--decode exposure`.
+    /// Applies `--decode exposure` to linear light.
     #[must_use]
-    pub fn scaled(&self, light: Arc<Light>) -> Arc<Light> {
+    pub fn scale_exposure(&self, light: Arc<Light>) -> Arc<Light> {
         let Some(ev) = self.exposure_ev else {
             return light;
         };
@@ -88,7 +88,7 @@ impl ReadingRule {
         Arc::new(light)
     }
 
-    /// The flags for linear light that were given.
+    /// The flags in use that affect only linear light.
     fn linear_flags(&self) -> Vec<String> {
         let linear = (self.transfer == Transfer::Linear).then_some("--decode transfer=linear");
         let exposure = self.exposure_ev.map(|_| "--decode exposure");
@@ -125,7 +125,7 @@ flag_words!(ColourRule, Transfer);
 impl Default for ReadingRule {
     fn default() -> Self {
         Self {
-            most_pixels: MOST_PIXELS,
+            max_pixels: MAX_PIXELS,
             colour: ColourRule::default(),
             transfer: Transfer::default(),
             exposure_ev: None,
@@ -138,7 +138,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_image_has_few_pixels_and_sides_that_fit_each_other() {
+    fn pixels_and_aspect_ratio_are_limited() {
         let rule = ReadingRule::default();
         for (width, height, fits) in [
             (10_000, 10_000, true),
@@ -150,10 +150,10 @@ mod tests {
             let found = rule.check_size(width, height);
             assert_eq!(found.is_ok(), fits, "{width} × {height}: {found:?}");
         }
-        let own = ReadingRule {
-            most_pixels: MOST_PIXELS - 1,
+        let user_limit = ReadingRule {
+            max_pixels: MAX_PIXELS - 1,
             ..rule
         };
-        assert_eq!(own.check_size(1, 1_001), Ok(()));
+        assert_eq!(user_limit.check_size(1, 1_001), Ok(()));
     }
 }

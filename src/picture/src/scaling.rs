@@ -16,7 +16,7 @@ use darkqa_ground::types::Rgb;
 pub enum Scaling {
     /// Not scaled.
     Never,
-    /// Reduced if a side is longer than this many pixels.
+    /// Reduced to this many pixels on the longer side, if it has more.
     MaxSide(NonZeroU32),
     /// Enlarged or reduced to this many pixels on the longer side.
     LongerSide(usize),
@@ -25,11 +25,11 @@ pub enum Scaling {
 impl Scaling {
     /// Width and height of an image after scaling, from its original width and height, in pixels.
     #[must_use]
-    pub fn size(self, (width, height): (u32, u32)) -> (usize, usize) {
+    pub fn size(self, width: u32, height: u32) -> (usize, usize) {
         match self {
             Self::Never => (width as usize, height as usize),
             Self::MaxSide(side) => {
-                let (width, height) = fitted_size((width, height), side);
+                let (width, height) = fitted_size(width, height, side);
                 (width as usize, height as usize)
             }
             Self::LongerSide(side) => {

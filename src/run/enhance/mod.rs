@@ -12,11 +12,11 @@ use crate::dataset::inputs::Inputs;
 use crate::dataset::{FolderArgs, Picture};
 use crate::engine::identity;
 use crate::error::{Error, Result};
-use crate::images::enhancement::enhancers::{EnhancerRunArgs, OpenEnhancers};
-use crate::images::enhancement::{darkened, evenly};
+use crate::images::enhancement::enhancers::{EnhancerModels, EnhancerRunArgs};
+use crate::images::enhancement::{dark_or_darkened, evenly_spaced_indices};
 use crate::images::frames::InputTally;
 use crate::images::progress::Progress;
-use crate::images::stored::{ImageCounts, ImageOrigin, Placed, Refusals};
+use crate::images::stored::{ImageCounts, ImageOrigin, OutputImage, Refusals};
 use crate::runs::Outcome;
 use crate::runs::shard_args::{ShardArgs, keep_shard};
 use crate::types::manifests::Status;
@@ -126,7 +126,7 @@ impl ModelArgs {
     }
 
     fn open(&self, file: ModelFile) -> Result<Enhancer> {
-        OpenEnhancers::load(vec![file], &self.loading)?
+        EnhancerModels::load(vec![file], &self.loading)?
             .take()?
             .into_iter()
             .next()
@@ -169,9 +169,9 @@ fn examine(args: &DoctorArgs, progress: &Progress) -> Result<Outcome> {
         let problem = "no image could be read; give at least one";
         return Err(Error::usage("INPUT", problem));
     }
-    let dark = darkened(&sample);
+    let dark = dark_or_darkened(&sample);
     let (model, n) = (args.enhancer.model.display(), dark.len());
-    progress.say(&format!(
+    progress.print_on_terminal(&format!(
         "{model}: enhancing {n} dark images with each value range and colour order"
     ));
     doctor::doctor(&args.files, image, &mut enhancer, &dark)
@@ -179,7 +179,7 @@ fn examine(args: &DoctorArgs, progress: &Progress) -> Result<Outcome> {
 
 /// A sample of the images. Unreadable ones are skipped here, and reported when they are enhanced.
 fn sample(images: &Inputs) -> Vec<Rgb> {
-    evenly(images.entries.len(), FRAMES)
+    evenly_spaced_indices(images.entries.len(), FRAMES)
         .into_iter()
         .filter_map(|index| images.picture(&images.entries[index]).ok()?.decode().ok())
         .collect()
@@ -198,7 +198,7 @@ fn enhance_images(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome> {
     keep_shard(&mut images.entries, args.part.resolve()?)?;
     let sample = sample(&images);
     if !sample.is_empty() {
-        enhancer.probe(&darkened(&sample), loading.probe.implausible())?;
+        enhancer.probe(&dark_or_darkened(&sample), loading.probe.implausible())?;
     }
     let (bar, tally) = (
         progress.bar("images", images.entries.len()),
@@ -213,8 +213,9 @@ fn enhance_images(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome> {
         let outcome = picture.and_then(|picture| {
             tally.add(&entry.id, &picture.note());
             let origin = EnhancedOrigin::new(&entry.id, &picture, &settings);
-            let place = Placed::new(out, &entry.stem, args.force).used_anyway(used_anyway.clone());
-            place.put(&origin, || {
+            let place = OutputImage::new(out, &entry.stem, args.force)
+                .with_used_anyway(used_anyway.clone());
+            place.write_unless_present(&origin, || {
                 let enhanced = enhancer.enhance(&picture.decode()?);
                 enhanced.map_err(|e| Error::data(format_args!("image {:?}", entry.id.0), e))
             })
@@ -248,7 +249,7 @@ fn enhance_images(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome> {
             } else {
                 ""
             },
-            counts.unwritten()
+            counts.not_written_text()
         ),
     ))
 }
@@ -268,7 +269,7 @@ struct EnhancedOrigin {
 
 impl ImageOrigin for EnhancedOrigin {
     const SCHEMAS: &'static [&'static str] = &["darkqa.enhanced/1"];
-    const IS_REPLACED: bool = false;
+    const REPLACES_OTHER_SETTINGS: bool = false;
 }
 
 /// Settings of the enhancer that determine the pixels. The digest has a name that is understandable in messages.

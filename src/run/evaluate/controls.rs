@@ -64,7 +64,7 @@ impl AddedControls {
     /// Prints the line about other-room.
     pub(super) fn print(&self, progress: &Progress) {
         if let Some(line) = self.line {
-            progress.say(line);
+            progress.print_on_terminal(line);
         }
     }
 }

@@ -130,7 +130,7 @@ impl Experiment for ChoiceSetup<'_> {
             .config
             .bank
             .as_ref()
-            .map(|bank| ("questions without answers", json!(bank.words())));
+            .map(|bank| ("questions without answers", json!(bank.description())));
         let reading = match self.dataset.summary() {
             [] => None,
             lines => Some(("reading of the data", json!(lines))),

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, HashSet};
 
-use crate::images::frames::first_asked;
+use crate::images::frames::first_question_per_frame;
 use crate::types::{FrameId, Question};
 
 /// For each frame, the frame whose image is shown instead.
@@ -15,7 +15,7 @@ pub(super) struct OtherRooms(BTreeMap<FrameId, FrameId>);
 impl OtherRooms {
     /// Chooses the other frames; `None` if all frames are of one scene. A frame without a scene (empty) counts as a scene of its own.
     pub(super) fn new(questions: &[Question], scene: impl Fn(&FrameId) -> String) -> Option<Self> {
-        let frames: Vec<&FrameId> = first_asked(questions)
+        let frames: Vec<&FrameId> = first_question_per_frame(questions)
             .into_iter()
             .map(|question| &question.frame)
             .collect();

@@ -131,7 +131,7 @@ fn prompts(
             let prompt = |view| {
                 let words = setup.config.prompts.render(view, &shown.question)?;
                 let prompt = match (view, setup.config.image_place) {
-                    (View::Image, ImagePlace::BeforeWords) => Prompt::behind(words.into()),
+                    (View::Image, ImagePlace::BeforeWords) => Prompt::after_images(words.into()),
                     _ => Prompt::from_text(words.into()),
                 };
                 let several = setup.dataset.image_series(&question.frame);
@@ -167,7 +167,11 @@ fn group(
         return Ok(None);
     }
     let image = condition
-        .map(|condition| setup.recipe.stimulus(&setup.sources[source], condition))
+        .map(|condition| {
+            setup
+                .recipe
+                .stimulus_digest(&setup.sources[source], condition)
+        })
         .transpose()?;
     let own = questions.own.iter().map(|shown| (shown, false));
     let others = questions.others.iter().map(|shown| (shown, true));

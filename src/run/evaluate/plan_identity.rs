@@ -34,7 +34,7 @@ pub(super) fn plan_identity(config: &Evaluation, dataset: &Dataset) -> Result<Id
         (!families.is_empty()).then(|| ("--families", json!(families))),
         bank.map(|bank| bank.digest().map(|digest| (ASK, json!(digest))))
             .transpose()?,
-        bank.map(|bank| ("--ask-per-image", json!(bank.each()))),
+        bank.map(|bank| ("--ask-per-image", json!(bank.questions_per_image()))),
         (rule.colour != usual.colour).then(|| ("--colour", json!(rule.colour.to_string()))),
         (rule.transfer != usual.transfer).then(|| ("--transfer", json!(rule.transfer.to_string()))),
         rule.exposure_ev.map(|ev| ("--exposure", json!(ev))),

@@ -16,11 +16,11 @@ use crate::engine::models::{self, ModelName, ModelUnderTest};
 use crate::engine::observer::Observer;
 use crate::engine::room_net::RoomNet;
 use crate::error::Result;
-use crate::images::enhancement::evenly;
-use crate::images::frames::{Source, first_asked, inspect_all, photographs};
+use crate::images::enhancement::evenly_spaced_indices;
+use crate::images::frames::{Source, first_question_per_frame, inspect_all, photographs};
 use crate::images::progress::Progress;
 use crate::images::recipes::Recipe;
-use crate::images::trials::questions::{QuestionBank, open_data, open_unasked, select};
+use crate::images::trials::questions::{QuestionBank, open_data, open_without_generating, select};
 use crate::images::trials::{check_enhanced, conditions};
 use crate::runs::shard_sources::shard_questions;
 use crate::types::manifests::PartPlace;
@@ -89,9 +89,9 @@ impl<'a> ChoiceSetup<'a> {
         let mut sources = if shows_images {
             inspect_all(&dataset, &questions, progress)?
         } else {
-            first_asked(&questions)
+            first_question_per_frame(&questions)
                 .into_iter()
-                .map(|question| Source::unseen(question.frame.clone()))
+                .map(|question| Source::without_frames(question.frame.clone()))
                 .collect()
         };
         if let Some(plan) = &config.plan {
@@ -101,18 +101,18 @@ impl<'a> ChoiceSetup<'a> {
             photographs::measure(&*dataset, &mut sources)?;
         }
         photographs::check_matches(&sources, &job.light.matches)?;
-        photographs::tell(&*dataset, &sources, progress);
+        photographs::print_darkness(&*dataset, &sources, progress);
         dark_already::print_note(job, progress);
         if !job.enhancers.is_empty()
             && job.enhancers.on().and(TreatmentSet::DARK).is_none()
             && !photographs::names(&sources).is_empty()
         {
             let line = "the photographs in the dark are not enhanced; --llie-on noise,dark enhances them too";
-            progress.say(line);
+            progress.print_on_terminal(line);
         }
         let mut recipe = Recipe::new(&job.light.kinds, job.format, job.max_side, &enhancer_files);
         if shows_images {
-            recipe = recipe.with_elsewhere(&job.enhancers.enhanced)?;
+            recipe = recipe.with_enhanced_images(&job.enhancers.enhanced)?;
         }
         let conditions = conditions(
             &job.light,
@@ -204,8 +204,8 @@ impl<'a> ChoiceSetup<'a> {
 
 /// Frames of the whole run, evenly spread, that a shard tries enhancers on. Frames that cannot be read are left out.
 fn probe_sources(dataset: &Dataset, selected: &[Question]) -> Vec<Source> {
-    let first = first_asked(selected);
-    evenly(first.len(), FRAMES)
+    let first = first_question_per_frame(selected);
+    evenly_spaced_indices(first.len(), FRAMES)
         .into_iter()
         .filter_map(|place| Source::from_questions(dataset, &first[place].frame).ok())
         .collect()
@@ -241,7 +241,7 @@ fn print_training(config: &Evaluation, progress: &Progress) {
     } else {
         ""
     };
-    progress.say(&format!(
+    progress.print_on_terminal(&format!(
         "room-net is a small network trained on well-lit drawn rooms: a demonstration, no vision-language model{lift}"
     ));
 }
@@ -250,11 +250,19 @@ fn print_training(config: &Evaluation, progress: &Progress) {
 /// measured.
 fn selected_data(config: &Evaluation, progress: &Progress) -> Result<(Dataset, Vec<Question>)> {
     let (place, set, selection) = (&config.place, &config.set, &config.selection);
-    let data = (place, &config.scene, set);
+    let scene = &config.scene;
     let dataset = match (&config.bank, &config.plan) {
-        (Some(bank), _) => bank.data(place, set, config.rule, progress)?,
-        (None, Some(_)) => open_unasked(data, selection, config.rule)?,
-        (None, None) => open_data(data, selection, &config.rules, config.rule, progress)?,
+        (Some(bank), _) => bank.open_images(place, set, config.rule, progress)?,
+        (None, Some(_)) => open_without_generating(place, scene, set, selection, config.rule)?,
+        (None, None) => open_data(
+            place,
+            scene,
+            set,
+            selection,
+            &config.rules,
+            config.rule,
+            progress,
+        )?,
     };
     let Some(plan) = &config.plan else {
         let questions = select(dataset.questions().to_vec(), selection)?;

@@ -10,7 +10,7 @@ use clap::Args;
 
 use crate::dataset::{self, DataPlace, Dataset, DecodeArgs, SceneArgs, SelectionArgs, SetArgs};
 use crate::error::{Error, Result};
-use crate::images::enhancement::enhancers::{self, EnhancerRunArgs, OpenEnhancers};
+use crate::images::enhancement::enhancers::{self, EnhancerModels, EnhancerRunArgs};
 use crate::images::frame_work::FrameWork;
 use crate::images::frames::{Source, input_summary, inspect_all, photographs, warn_of_inputs};
 use crate::images::image_pipeline::ImagePipeline;
@@ -87,13 +87,13 @@ pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> 
     let light = LightSettings::resolve(&args.light, set)?;
     let enhancement = args.enhancers.clone().for_set(set);
     check_used(&light, &enhancement)?;
-    let rules = rules(args.selection.rules.as_deref())?;
-    let rule = args.decode.rule();
     let dataset = open_data(
-        (&args.data, &args.scene, &args.set),
+        &args.data,
+        &args.scene,
+        &args.set,
         &args.selection,
-        &rules,
-        rule,
+        &rules(args.selection.rules.as_deref())?,
+        args.decode.rule(),
         progress,
     )?;
     for line in dataset.printed_summary() {
@@ -105,9 +105,9 @@ pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> 
     let asked: BTreeSet<&FrameId> = questions.iter().map(|question| &question.frame).collect();
     let names = file_names(asked.iter().copied());
     let own_questions = shard_questions(&questions, asked, shard)?;
-    let files = enhancers::read(&args.enhancers.llie)?;
+    let files = enhancers::read_models(&args.enhancers.llie)?;
     let recipe = Recipe::lossless(&light.kinds, &files);
-    let recipe = recipe.with_elsewhere(&args.enhancers.enhanced)?;
+    let recipe = recipe.with_enhanced_images(&args.enhancers.enhanced)?;
     let workers = pool(args.loading.threads.threads)?;
     let mut sources = workers.install(|| inspect_all(&dataset, &own_questions, progress))?;
     if !light.matches.is_empty() {
@@ -132,7 +132,7 @@ pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> 
         timings: &timings,
         stored: None,
     };
-    let enhancers = OpenEnhancers::load(files, &args.loading)?.take()?;
+    let enhancers = EnhancerModels::load(files, &args.loading)?.take()?;
     let mut pipeline = ImagePipeline::new(steps, enhancers, args.loading.probe.implausible());
     workers.install(|| pipeline.probe_sources(&sources))?;
     let frames: BTreeMap<&FrameId, &Source> = sources
@@ -148,7 +148,7 @@ pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> 
                 .filter(|(_, question)| question.frame == **frame)
                 .collect();
             for source_frame in &source.frames {
-                let mut work = FrameWork::planned(pipeline.steps, source, source_frame);
+                let mut work = FrameWork::for_source(pipeline.steps, source, source_frame);
                 for (condition, set) in conditions.iter().zip(&mut sets) {
                     if !source_frame.can_show(condition) {
                         continue;

@@ -17,7 +17,7 @@ use crate::drawing::paper::{
 };
 use crate::error::{Error, Result};
 use crate::files;
-use crate::picture::{pixels_of_url, png};
+use crate::picture::{decode_data_url, png};
 use crate::run_reports::FigureRuns;
 use crate::runs::Outcome;
 use crate::text::table::Table;
@@ -145,7 +145,7 @@ pub(crate) fn figures(args: &FiguresArgs) -> Result<Outcome> {
                 &overview(findings, &names),
                 runs.thumbnails(),
                 &look,
-                &|url| pixels_of_url(url, MAX_SIDE),
+                &|url| decode_data_url(url, MAX_SIDE),
             )?;
             files.add_overview(&sheet, &args.format, &look)?;
             continue;

@@ -250,7 +250,7 @@ impl<'a> FrameWriter<'a> {
             MessageImage::File { format, bytes } => {
                 let file =
                     ImageFile::new(bytes.into_owned(), frame.words(), ReadingRule::default());
-                let ending = file.ending();
+                let ending = file.extension();
                 if !COPIED.contains(&ending) {
                     return Err(format!(
                         "format {:?}; a JPEG, PNG or WebP file expected",

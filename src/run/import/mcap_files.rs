@@ -96,7 +96,7 @@ pub(super) fn overview(files: &[PathBuf], progress: &Progress) -> Result<Overvie
 fn image_size(bytes: &[u8]) -> Result<(u32, u32), String> {
     let name = "the first image".to_owned();
     let file = ImageFile::new(bytes.to_vec(), name, ReadingRule::default());
-    let ending = file.ending();
+    let ending = file.extension();
     if !COPIED.contains(&ending) {
         return Err(format!("a file .{ending}; JPEG, PNG or WebP expected"));
     }

@@ -50,7 +50,7 @@ fn group(
         return Ok(None);
     }
     let walk = &setup.sources[source];
-    let images = condition.map(|condition| setup.recipe.stimulus(walk, condition));
+    let images = condition.map(|condition| setup.recipe.stimulus_digest(walk, condition));
     let images: Option<Digest> = images.transpose()?;
     let mut trials = Vec::new();
     for question in questions {
@@ -79,7 +79,7 @@ fn prompt(question: &OpenQuestion, view: View) -> Prompt {
             let (before, behind) = vision(&question.text);
             Prompt {
                 before: before.into(),
-                behind: Some(behind.into()),
+                after: Some(behind.into()),
                 places: ImagePlaces::Together,
             }
         }

@@ -12,7 +12,7 @@ use crate::engine::batch::{BatchFileArgs, BatchRunArgs};
 use crate::engine::models::ModelName;
 use crate::engine::settings::{ExperimentSettings, JobArgs, JobSettings};
 use crate::error::{Error, Result};
-use crate::images::frames::Walk;
+use crate::images::frames::WalkArgs;
 use crate::picture::ReadingRule;
 use crate::types::Decides;
 use darkqa_score::choice::llm_match::Protocol;
@@ -28,7 +28,7 @@ pub(crate) struct OpenEqaArgs {
     pub chosen: OpenSelectionArgs,
     /// The flags for showing walks.
     #[command(flatten)]
-    pub walk: Walk,
+    pub walk: WalkArgs,
     /// The reading of images.
     #[command(flatten)]
     pub decode: DecodeArgs,
@@ -87,7 +87,7 @@ pub(crate) struct AnswersFile {
 pub(super) struct OpenEqa {
     pub(super) questions: PathBuf,
     pub(super) chosen: OpenSelectionArgs,
-    pub(super) walk: Walk,
+    pub(super) walk: WalkArgs,
     /// Rule for decoding images.
     pub(super) rule: ReadingRule,
     pub(super) answers: Vec<AnswersFile>,

@@ -80,7 +80,7 @@ impl<'a> OpenSetup<'a> {
         let recipe = Recipe::new(&job.light.kinds, job.format, None, &files);
         let recipe = recipe.for_walks(&config.walk);
         let recipe = if shows_frames {
-            recipe.with_elsewhere(&job.enhancers.enhanced)?
+            recipe.with_enhanced_images(&job.enhancers.enhanced)?
         } else {
             recipe
         };
@@ -99,7 +99,7 @@ impl<'a> OpenSetup<'a> {
             (
                 names
                     .into_iter()
-                    .map(|name| Source::unseen(FrameId(name)))
+                    .map(|name| Source::without_frames(FrameId(name)))
                     .collect(),
                 Vec::new(),
             )

@@ -9,7 +9,7 @@ use crate::engine::image_limit;
 use crate::engine::pipeline;
 use crate::error::Result;
 use crate::files::write;
-use crate::images::enhancement::enhancers::OpenEnhancers;
+use crate::images::enhancement::enhancers::EnhancerModels;
 use crate::images::progress::Progress;
 use crate::images::recipes::Maker;
 use crate::images::stored::StoredImages;
@@ -34,7 +34,7 @@ pub(super) fn pack(
     progress: &Progress,
 ) -> Result<Outcome> {
     let settings = setup.settings();
-    let mut enhancers = OpenEnhancers::load(files, &settings.loading)?;
+    let mut enhancers = EnhancerModels::load(files, &settings.loading)?;
     let limit = image_limit(settings);
     let timings = Timings::default();
     let images = settings.images.open(settings.access)?;

@@ -107,7 +107,7 @@ fn compare_pair(
     let (exposure_comparison, _) = compare_image(&exposure)?;
     let (mut noise, mut residuals, mut images) = (Vec::new(), Vec::new(), Vec::new());
     for (method, synthesis) in methods(sensor, fits, &checked.pair.name)? {
-        let state = synthesis.state_by(&key, drop);
+        let state = synthesis.state_after_drop(&key, drop);
         let render = |terms: &[Term]| {
             let (amplify, tone) = (synthesis.amplify, synthesis.tone);
             let headroom = synthesis.headroom_ev(drop);

@@ -87,7 +87,7 @@ impl ProfileLadder {
 
 /// The state of a camera at the middle of its ranges, which is the same for all frames.
 fn fixed_state(synthesis: &Synthesis, drop_ev: f64) -> CameraState {
-    synthesis.state_by(&NoiseKey::new(0, &FrameId(String::new())), drop_ev)
+    synthesis.state_after_drop(&NoiseKey::new(0, &FrameId(String::new())), drop_ev)
 }
 
 /// The fits to one pair, one for each noise profile.

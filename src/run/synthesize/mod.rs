@@ -18,7 +18,7 @@ use crate::images::frames::{Frames, InputTally};
 use crate::images::image_steps::ImageSteps;
 use crate::images::progress::{Progress, StepBar};
 use crate::images::recipes::{ImageRecipe, Recipe};
-use crate::images::stored::{ImageCounts, ImageOutcome, Placed, Refusals, Sidecar};
+use crate::images::stored::{ImageCounts, ImageOutcome, OutputImage, Refusals, Sidecar};
 use crate::images::timings::Timings;
 use crate::images::workers::{ThreadArgs, pool};
 use crate::runs::Outcome;
@@ -179,7 +179,7 @@ fn outcome(counts: ImageCounts, out: &Path, frames: usize) -> Outcome {
             out.display(),
             counts.written,
             counted(frames, "frame"),
-            counts.unwritten()
+            counts.not_written_text()
         ),
     )
 }
@@ -227,7 +227,7 @@ fn write_files(
     let mut work = SynthesisWork {
         making,
         entry,
-        frame: FrameWork::alone(steps, entry.id.clone()),
+        frame: FrameWork::for_frame(steps, entry.id.clone()),
     };
     match work.frame.note() {
         Ok(note) => tally.add(&entry.id, &note),
@@ -291,20 +291,27 @@ impl SynthesisWork<'_> {
         let key = NoiseKey::new(seed, &self.entry.id);
         let condition = Condition::raw(how.cloned());
         let name = format!("{}_{condition}", self.entry.stem);
-        let applied = how.map(|how| self.frame.applied(how)).transpose()?;
+        let applied = how.map(|how| self.frame.apply(how)).transpose()?;
         let picture = self.frame.picture()?;
-        let file = (picture.digest(), picture.note());
-        let recipe = ImageRecipe::new(&self.entry.id, file, how, applied.as_ref(), &key, seed);
-        let place = Placed::new(&self.making.args.out, &name, self.making.args.force);
-        place.put(&recipe, || Ok(Rgb::clone(self.frame.degraded(how)?)))
+        let recipe = ImageRecipe::new(
+            &self.entry.id,
+            picture.digest(),
+            picture.note(),
+            how,
+            applied.as_ref(),
+            &key,
+            seed,
+        );
+        let place = OutputImage::new(&self.making.args.out, &name, self.making.args.force);
+        place.write_unless_present(&recipe, || Ok(Rgb::clone(self.frame.degraded(how)?)))
     }
 
     fn sheet(&mut self, kind: Sheet) -> Result<ImageOutcome> {
         let light = &self.making.light;
         let recipe = SheetRecipe::new(kind, &self.entry.id, self.frame.picture()?, light)?;
         let name = format!("{}_{kind}", self.entry.stem);
-        let place = Placed::new(&self.making.args.out, &name, self.making.args.force);
-        place.put(&recipe, || kind.draw(&mut self.frame, light))
+        let place = OutputImage::new(&self.making.args.out, &name, self.making.args.force);
+        place.write_unless_present(&recipe, || kind.draw(&mut self.frame, light))
     }
 }
 
@@ -329,9 +336,10 @@ fn replay(args: &ReplayArgs) -> Result<Outcome> {
     let degraded = ImageRecipe::replay(&sidecar, &picture, file)?;
     let name = sidecar.recipe.name(&stem(&sidecar.recipe.frame())?);
     fs::create_dir_all(&args.out).map_err(|e| Error::file(&args.out, "make", e))?;
-    let place = Placed::new(&args.out, &name, args.force);
+    let place = OutputImage::new(&args.out, &name, args.force);
     let mut counts = ImageCounts::default();
-    if let Some(refusal) = counts.add(place.put(&sidecar.recipe, || Ok(degraded))?) {
+    if let Some(refusal) = counts.add(place.write_unless_present(&sidecar.recipe, || Ok(degraded))?)
+    {
         return Err(refusal.into_error());
     }
     Ok(outcome(counts, &args.out, 1))

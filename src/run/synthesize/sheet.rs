@@ -16,7 +16,7 @@ use crate::images::stored::ImageOrigin;
 use crate::types::degradations::{Axis, Kind};
 use crate::types::{AxisLevel, Degradation, FrameId, Rgb, Severity, Variant};
 use darkqa_light::raw::noise::{self, Term};
-use darkqa_light::raw::{Bayer, unprocess_up_to};
+use darkqa_light::raw::{Bayer, unprocess_with_headroom};
 use darkqa_light::{Coupling, Draws, LightSettings, NoiseKey, Synthesis, version};
 
 /// The kind of a figure of one frame.
@@ -57,7 +57,7 @@ pub(super) struct SheetRecipe {
 
 impl ImageOrigin for SheetRecipe {
     const SCHEMAS: &'static [&'static str] = &["darkqa.sheet/1"];
-    const IS_REPLACED: bool = true;
+    const REPLACES_OTHER_SETTINGS: bool = true;
 }
 
 impl SheetRecipe {
@@ -176,7 +176,7 @@ fn draw_levels(frame: &mut FrameWork<'_>, light: &LightSettings) -> Result<Rgb> 
             .into_iter()
             .map(|(variant, all)| {
                 let images = all.into_iter().map(|how| {
-                    let dark_ev = frame.applied(how)?.drop_ev();
+                    let dark_ev = frame.apply(how)?.drop_ev();
                     let image = Rgb::clone(frame.degraded(Some(how))?);
                     Ok(LevelImage { image, dark_ev })
                 });
@@ -211,7 +211,7 @@ fn draw_terms(frame: &mut FrameWork<'_>, light: &LightSettings) -> Result<Rgb> {
         Draws::Fresh => frame.at(level),
     };
     let state = synthesis.state(&frame, level);
-    let raw = unprocess_up_to(&clean, &state, synthesis.headroom_ev(level.value()));
+    let raw = unprocess_with_headroom(&clean, &state, synthesis.headroom_ev(level.value()));
     let range = state.adu_range as f32;
     let with_terms = |terms: &[Term]| {
         let mut noisy = raw.clone();

@@ -11,7 +11,7 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use darkqa_picture::ImageFile;
 use darkqa_picture::ReadingRule;
-use darkqa_picture::reading_rule::MOST_PIXELS;
+use darkqa_picture::reading_rule::MAX_PIXELS;
 use image::{DynamicImage, ImageFormat, Rgb};
 
 use exr::prelude::Compression;
@@ -197,7 +197,7 @@ fn read_mutated(rounds: usize) -> [usize; 2] {
         let _ = picture.check();
         match picture.decode() {
             Ok(rgb) => {
-                assert!((rgb.height() * rgb.width()) as u64 <= MOST_PIXELS);
+                assert!((rgb.height() * rgb.width()) as u64 <= MAX_PIXELS);
                 counts[0] += 1;
             }
             Err(error) => {
@@ -210,7 +210,7 @@ fn read_mutated(rounds: usize) -> [usize; 2] {
 }
 
 /// What a whole image of the most pixels takes, at 12 bytes a pixel: three floats.
-const MOST_BYTES: usize = MOST_PIXELS as usize * 12;
+const MOST_BYTES: usize = MAX_PIXELS as usize * 12;
 
 #[test]
 fn a_profile_that_grows_without_bound_takes_no_memory() {

@@ -41,7 +41,7 @@ fn runtime(version: &str) -> (String, String) {
     ("onnxruntime".to_owned(), version.to_owned())
 }
 
-/// The digest of the key of a frame in a condition.
+/// Digest of the store key of a frame in a condition.
 fn key(recipe: &Recipe, frame: &SourceFrame, condition: &str, maker: &Maker) -> Digest {
     let folder = tempfile::tempdir().unwrap();
     let store = ImageStore::open(
@@ -54,14 +54,14 @@ fn key(recipe: &Recipe, frame: &SourceFrame, condition: &str, maker: &Maker) -> 
     let source = FrameId("walk".to_owned());
     let condition = condition.parse().unwrap();
     let stored = StoredImages::new(&store, maker);
-    let place = stored.place(recipe, (&source, frame), &condition).unwrap();
+    let place = stored.place(recipe, &source, frame, &condition).unwrap();
     *place.image.digest()
 }
 
 const CONDITION: &str = "L3-noise+one";
 
-/// The key with one part of the recipe changed.
-fn changed(change: impl FnOnce(&mut Recipe)) -> Digest {
+/// The key with a changed recipe.
+fn key_with_recipe(change: impl FnOnce(&mut Recipe)) -> Digest {
     let mut recipe = recipe();
     change(&mut recipe);
     key(
@@ -72,8 +72,8 @@ fn changed(change: impl FnOnce(&mut Recipe)) -> Digest {
     )
 }
 
-/// The key with another version of the runtime or other sizes.
-fn made_by(version: &str, change: impl FnOnce(&mut SizeArgs)) -> Digest {
+/// The key with this version of the runtime and changed sizes.
+fn key_with_maker(version: &str, change: impl FnOnce(&mut SizeArgs)) -> Digest {
     let mut sizes = sizes();
     change(&mut sizes);
     key(
@@ -85,45 +85,52 @@ fn made_by(version: &str, change: impl FnOnce(&mut SizeArgs)) -> Digest {
 }
 
 #[test]
-fn every_part_of_what_decides_an_image_gives_another_key() {
-    let same = changed(|_| {});
-    assert_eq!(made_by("1", |_| {}), same);
+fn every_fact_that_decides_an_image_changes_its_key() {
+    let same = key_with_recipe(|_| {});
+    assert_eq!(key_with_maker("1", |_| {}), same);
     let maker = Maker::new(Some(runtime("1")), &sizes());
-    let of = |frame: &SourceFrame, condition| key(&recipe(), frame, condition, &maker);
-    let mut others = vec![
-        changed(|recipe| recipe.seed = 1),
-        changed(|recipe| recipe.format = "jpeg:80".parse().unwrap()),
-        changed(|recipe| recipe.scaling = Scaling::LongerSide(4)),
-        changed(|recipe| {
+    let id = FrameId("b".to_owned());
+    let digest = Digest::from_bytes(b"other pixels");
+    let others = vec![
+        key_with_recipe(|recipe| recipe.seed = 1),
+        key_with_recipe(|recipe| recipe.format = "jpeg:80".parse().unwrap()),
+        key_with_recipe(|recipe| recipe.scaling = Scaling::LongerSide(4)),
+        key_with_recipe(|recipe| {
             recipe.scaling = Scaling::LongerSide(4);
             recipe.degraded_at = DegradeStage::Resized;
         }),
-        changed(|recipe| recipe.camera_of = CameraScope::Episode),
-        changed(|recipe| recipe.enhancers[0].1 = Digest::from_bytes(b"another file")),
-        made_by("2", |_| {}),
-        made_by("1", |sizes| sizes.tile = darkqa_enhance::Tiling::Whole),
-        made_by("1", |sizes| sizes.llie_max_side = NonZeroUsize::new(64)),
-        made_by("1", |sizes| sizes.llie_resize = true),
-        of(&frame(), "L4-noise+one"),
-        of(&frame(), "L3-ev+one"),
-        of(&frame(), "L3-noise"),
+        key_with_recipe(|recipe| recipe.camera_scope = CameraScope::Episode),
+        key_with_recipe(|recipe| recipe.enhancers[0].1 = Digest::from_bytes(b"another file")),
+        key_with_maker("2", |_| {}),
+        key_with_maker("1", |sizes| sizes.tile = darkqa_enhance::Tiling::Whole),
+        key_with_maker("1", |sizes| sizes.llie_max_side = NonZeroUsize::new(64)),
+        key_with_maker("1", |sizes| sizes.llie_resize = true),
+        key(&recipe(), &frame(), "L4-noise+one", &maker),
+        key(&recipe(), &frame(), "L3-ev+one", &maker),
+        key(&recipe(), &frame(), "L3-noise", &maker),
+        key(&recipe(), &SourceFrame { id, ..frame() }, CONDITION, &maker),
+        key(
+            &recipe(),
+            &SourceFrame { digest, ..frame() },
+            CONDITION,
+            &maker,
+        ),
     ];
-    let id = FrameId("b".to_owned());
-    others.push(of(&SourceFrame { id, ..frame() }, CONDITION));
-    let digest = Digest::from_bytes(b"other pixels");
-    others.push(of(&SourceFrame { digest, ..frame() }, CONDITION));
-    for (place, other) in others.iter().enumerate() {
-        assert_ne!(*other, same, "{place}");
+    for (index, other) in others.iter().enumerate() {
+        assert_ne!(*other, same, "{index}");
     }
 }
 
 #[test]
-fn what_decides_no_degraded_image_leaves_its_key() {
-    let of = |maker: &Maker| key(&recipe(), &frame(), "L3-noise", maker);
+fn enhancer_settings_do_not_change_keys_of_degraded_images() {
     let whole = SizeArgs {
         tile: darkqa_enhance::Tiling::Whole,
         ..sizes()
     };
-    let without = of(&Maker::new(None, &sizes()));
-    assert_eq!(of(&Maker::new(Some(runtime("1")), &whole)), without);
+    let [without, with] = [
+        Maker::new(None, &sizes()),
+        Maker::new(Some(runtime("1")), &whole),
+    ]
+    .map(|maker| key(&recipe(), &frame(), "L3-noise", &maker));
+    assert_eq!(with, without);
 }

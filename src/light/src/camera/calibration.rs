@@ -126,17 +126,9 @@ impl Calibration {
 
     /// Checks all values against their limits; the error names the key.
     fn check(&self) -> std::result::Result<(), String> {
-        let range = |key: &str, [low, high]: [f64; 2], limits| {
-            check_limits(key, low, limits)?;
-            check_limits(key, high, limits)?;
-            if low > high {
-                return Err(format!("{key}: the range [{low}, {high}] runs backwards"));
-            }
-            Ok(())
-        };
         check_limits("adu-range", self.adu_range, [1.0, 1e6])?;
-        range("gain", self.gain, GAINS)?;
-        range("ratio", self.ratio, RATIOS)?;
+        check_range("gain", self.gain, GAINS)?;
+        check_range("ratio", self.ratio, RATIOS)?;
         for (key, fit) in [
             ("read-scale", self.read_scale),
             ("row-deviation", self.row_deviation),
@@ -199,16 +191,15 @@ impl Calibration {
     /// Noise parameters at the system gain `gain`, which is in ADU per electron.
     ///
     /// `scatter` contains the standard normal draws z for σ_TL and σ_r. `choices`, uniform in (0, 1), select a shape and an
-    /// offset set from the step with the nearest gain, each with equal probability. The calibration's author advises to use only
-    /// measurements near the gain: offsets measured at ISO 25600 do not apply at K = 0.1.
+    /// offset set from the step with the nearest gain, each with equal probability. The author of the calibration recommends
+    /// measurements near the gain only: offsets measured at ISO 25600 do not apply at K = 0.1.
     #[must_use]
     pub fn noise_at(&self, gain: f64, scatter: [f64; 2], choices: [f64; 2]) -> SensorNoise {
         let step = &self.steps[self.nearest_step(gain)];
-        let chosen = |choice: f64, n: usize| ((choice * n as f64) as usize).min(n - 1);
-        let [r, g1, b, g2] = step.bias[chosen(choices[1], step.bias.len())];
+        let [r, g1, b, g2] = *select(&step.bias, choices[1]);
         SensorNoise {
             read_scale: self.read_scale.at(gain, scatter[0]),
-            read_shape: step.shape[chosen(choices[0], step.shape.len())],
+            read_shape: *select(&step.shape, choices[0]),
             row_deviation: self.row_deviation.at(gain, scatter[1]),
             bias: [r, g1, g2, b],
         }
@@ -216,14 +207,14 @@ impl Calibration {
 
     /// Index of the step with the nearest gain on a log scale, at most the step nearest to the upper end of the gain range.
     fn nearest_step(&self, gain: f64) -> usize {
-        let nearest = |gain: f64| match self.first_gain {
+        let [step, last_step] = [gain, self.gain[1]].map(|gain| match self.first_gain {
             Some(first) => {
                 let step = (libm::log2(gain / first) + 0.5).floor();
                 step.clamp(0.0, (self.steps.len() - 1) as f64) as usize
             }
             None => self.nearest_listed_step(gain),
-        };
-        nearest(gain).min(nearest(self.gain[1]))
+        });
+        step.min(last_step)
     }
 
     /// Index of the step whose own `gain` is nearest on a log scale; the lower of two equally near steps.
@@ -238,6 +229,20 @@ impl Calibration {
             .min_by(|a, b| a.1.total_cmp(&b.1))
             .map_or(0, |(index, _)| index)
     }
+}
+
+/// Checks that a range is within limits and not reversed; the error names the key.
+fn check_range(
+    key: &str,
+    [low, high]: [f64; 2],
+    limits: [f64; 2],
+) -> std::result::Result<(), String> {
+    check_limits(key, low, limits)?;
+    check_limits(key, high, limits)?;
+    if low > high {
+        return Err(format!("{key}: the range [{low}, {high}] runs backwards"));
+    }
+    Ok(())
 }
 
 /// Checks that a value is between two limits, inclusive; the error names the key.
@@ -261,6 +266,12 @@ impl LogFit {
     fn at(&self, gain: f64, z: f64) -> f64 {
         libm::exp(self.slope * libm::log(gain) + self.intercept + self.deviation * z)
     }
+}
+
+/// The item that a uniform number in (0, 1) selects.
+fn select<T>(items: &[T], choice: f64) -> &T {
+    let index = ((choice * items.len() as f64) as usize).min(items.len() - 1);
+    &items[index]
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! The camera of a frame: the distribution of cameras ([`CameraModel`]) and one drawn from it ([`CameraState`]).
+//! Camera of a frame: a distribution of cameras ([`CameraModel`]), and one camera drawn from it ([`CameraState`]).
 
 pub(super) mod calibration;
 
@@ -21,8 +21,7 @@ use darkqa_ground::types::Digest;
 /// Distribution that each frame's camera is drawn from.
 ///
 /// The default is the paper's: a Sony A7S2 with its gain K log-uniform in [0.1, 6.0] and its amplification ratio r
-/// uniform in [100, 300]. Either may be pinned. The other numbers of the state then stay as they were drawn, except those
-/// that are functions of K.
+/// uniform in [100, 300]. Either may be pinned. The other parameters of a state are drawn as before, except functions of K.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CameraModel {
     calibration: Arc<Calibration>,
@@ -49,7 +48,7 @@ impl Default for CameraModel {
     }
 }
 
-/// Writes the calibration's name and digest instead of its numbers, which would fill a page.
+/// Writes the name and digest of the calibration instead of its many numbers.
 impl Serialize for CameraModel {
     fn serialize<S: Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
         let calibration =
@@ -65,7 +64,7 @@ impl Serialize for CameraModel {
 }
 
 impl CameraModel {
-    /// Cameras of a calibration, drawn for each frame, with nothing pinned.
+    /// Cameras of a calibration, drawn for each frame, without pinned gain and ratio.
     #[must_use]
     pub fn new(calibration: Calibration) -> Self {
         Self {
@@ -111,7 +110,7 @@ impl CameraModel {
         self.sampling = sampling;
     }
 
-    /// The same cameras with neither gain nor ratio pinned.
+    /// The same cameras without pinned gain and ratio.
     #[must_use]
     pub fn unpinned(&self) -> Self {
         Self {
@@ -127,7 +126,7 @@ impl CameraModel {
         &self.calibration.name
     }
 
-    /// Range that the system gain K is drawn from, in ADU per electron.
+    /// Range from which the system gain K is drawn, in ADU per electron.
     #[must_use]
     pub fn gain_range(&self) -> [f64; 2] {
         self.calibration.gain
@@ -142,12 +141,12 @@ impl CameraModel {
         Ok(())
     }
 
-    /// Calibration that cameras are drawn from.
+    /// Calibration of the cameras.
     pub fn calibration(&self) -> &Calibration {
         &self.calibration
     }
 
-    /// Replaces the range that the system gain K is drawn from, in ADU per electron.
+    /// Replaces the range from which the system gain K is drawn, in ADU per electron.
     ///
     /// # Errors
     /// If it is not within 0.01 to 100, or runs backwards.
@@ -261,7 +260,7 @@ impl CameraState {
         }
     }
 
-    /// A state with this colour and noise; all gains and the ratio are 1.
+    /// A state with these mixing weights of the colour matrix and this noise; all gains and the ratio are 1.
     fn new(weights: [f64; 4], noise: &SensorNoise, calibration: &Calibration) -> Self {
         let rgb_to_camera = colour::rgb_to_camera(weights);
         Self {
@@ -281,7 +280,7 @@ impl CameraState {
     }
 }
 
-/// Random numbers of a state. Each has a fixed address in the camera's stream, so that none depends on the other draws.
+/// Addresses of the random numbers of a state in the camera's stream. They are fixed, so that no number depends on other draws.
 #[derive(Debug, Clone, Copy)]
 enum StateNumber {
     FirstWeight,
@@ -325,7 +324,7 @@ impl CameraStream {
         low + self.uniform(number) * (high - low)
     }
 
-    /// A draw of N(0.8, 0.1), truncated at three deviations, because its inverse, the brightness gain, would have no bound.
+    /// A draw of N(0.8, 0.1), truncated at three standard deviations, because its inverse, the brightness gain, would be unbounded.
     fn truncated_normal(self, number: StateNumber) -> f64 {
         let mut words = self.words(number);
         loop {

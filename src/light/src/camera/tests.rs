@@ -1,7 +1,7 @@
 use super::*;
 use darkqa_ground::types::FrameId;
 
-/// The fixed camera, for which the published figures of flat greys hold.
+/// The fixed camera, with the middle of every range.
 pub(crate) fn median() -> CameraState {
     let mut model = CameraModel::default();
     model.set_sampling(Sampling::Fixed);
@@ -23,7 +23,7 @@ fn the_fixed_camera_is_the_same_for_all_frames() {
 }
 
 #[test]
-fn a_state_is_read_as_it_was_written() {
+fn a_serialized_state_can_be_deserialized() {
     for state in states(&CameraModel::default(), 50) {
         let text = serde_json::to_string(&state).unwrap();
         assert_eq!(serde_json::from_str::<CameraState>(&text).unwrap(), state);
@@ -49,49 +49,56 @@ fn every_calibrated_camera_stays_in_its_ranges() {
 }
 
 fn states(model: &CameraModel, n: usize) -> Vec<CameraState> {
-    let key = |i| NoiseKey::new(5, &FrameId(format!("frame {i}")));
-    (0..n).map(|i| CameraState::draw(&key(i), model)).collect()
+    (0..n)
+        .map(|i| {
+            let key = NoiseKey::new(5, &FrameId(format!("frame {i}")));
+            CameraState::draw(&key, model)
+        })
+        .collect()
 }
 
-/// The largest distance between the sample's distribution function and `cdf`, in units of 1/√n.
+/// The Kolmogorov–Smirnov statistic: largest distance between the empirical distribution function and `cdf`, in units of 1/√n.
 fn kolmogorov(mut sample: Vec<f64>, cdf: impl Fn(f64) -> f64) -> f64 {
     sample.sort_by(f64::total_cmp);
     let n = sample.len() as f64;
     sample
         .iter()
         .enumerate()
-        .map(|(i, x): (usize, &f64)| {
+        .map(|(i, x)| {
             let f = cdf(*x);
-            (f - i as f64 / n).abs().max(((i + 1) as f64 / n - f).abs())
+            f64::max((f - i as f64 / n).abs(), ((i + 1) as f64 / n - f).abs())
         })
         .fold(0.0, f64::max)
         * n.sqrt()
 }
 
+/// A number of a camera state.
+type Number = fn(&CameraState) -> f64;
+
+fn normal_cdf(z: f64) -> f64 {
+    0.5 * libm::erfc(-z / f64::sqrt(2.0))
+}
+
 #[test]
 fn numbers_have_their_distributions() {
     let all = states(&CameraModel::default(), 10_000);
-    let of = |f: fn(&CameraState) -> f64| all.iter().map(f).collect::<Vec<_>>();
-    let uniform = |low: f64, high: f64| move |x: f64| (x - low) / (high - low);
-    let normal = |z: f64| 0.5 * libm::erfc(-z / f64::sqrt(2.0));
-    let truncated =
-        |inverse: f64| (normal((inverse - 0.8) / 0.1) - normal(-3.0)) / (1.0 - 2.0 * normal(-3.0));
-    let cases = [
-        (
-            "K",
-            kolmogorov(
-                of(|s| s.system_gain.ln()),
-                uniform(0.1f64.ln(), 6.0f64.ln()),
-            ),
-        ),
-        ("r", kolmogorov(of(|s| s.ratio), uniform(100.0, 300.0))),
-        ("red", kolmogorov(of(|s| s.red_gain), uniform(1.9, 2.4))),
-        ("blue", kolmogorov(of(|s| s.blue_gain), uniform(1.5, 1.9))),
-        ("1/rgb", kolmogorov(of(|s| 1.0 / s.rgb_gain), truncated)),
+    let uniform: [(&str, Number, [f64; 2]); 4] = [
+        ("K", |s| s.system_gain.ln(), [0.1f64.ln(), 6.0f64.ln()]),
+        ("r", |s| s.ratio, [100.0, 300.0]),
+        ("red", |s| s.red_gain, [1.9, 2.4]),
+        ("blue", |s| s.blue_gain, [1.5, 1.9]),
     ];
-    for (name, distance) in cases {
+    for (name, number, [low, high]) in uniform {
+        let sample = all.iter().map(number).collect();
+        let distance = kolmogorov(sample, |x| (x - low) / (high - low));
         assert!(distance < 1.95, "{name}: {distance}");
     }
+    let inverse_gains = all.iter().map(|s| 1.0 / s.rgb_gain).collect();
+    let tail = normal_cdf(-3.0);
+    let distance = kolmogorov(inverse_gains, |inverse| {
+        (normal_cdf((inverse - 0.8) / 0.1) - tail) / (1.0 - 2.0 * tail)
+    });
+    assert!(distance < 1.95, "1/rgb: {distance}");
     assert!(
         all.iter()
             .all(|s| (0.5..=1.1).contains(&(1.0 / s.rgb_gain)))
@@ -100,7 +107,7 @@ fn numbers_have_their_distributions() {
 }
 
 #[test]
-fn a_pinned_number_changes_no_other() {
+fn pinned_numbers_do_not_change_others() {
     let mut pinned = CameraModel::default();
     pinned.pin_ratio(42.0).unwrap();
     let (free, fixed) = (states(&CameraModel::default(), 20), states(&pinned, 20));
@@ -122,15 +129,14 @@ fn a_pinned_number_changes_no_other() {
 
 #[test]
 fn frames_and_seeds_have_different_cameras() {
-    let draw = |seed, id: &str| {
-        CameraState::draw(
-            &NoiseKey::new(seed, &FrameId(id.to_owned())),
-            &CameraModel::default(),
-        )
-    };
-    assert_eq!(draw(1, "a"), draw(1, "a"));
-    assert_ne!(draw(1, "a"), draw(2, "a"));
-    assert_ne!(draw(1, "a"), draw(1, "b"));
+    let [first, same, other_seed, other_frame] =
+        [(1, "a"), (1, "a"), (2, "a"), (1, "b")].map(|(seed, frame)| {
+            let key = NoiseKey::new(seed, &FrameId(frame.to_owned()));
+            CameraState::draw(&key, &CameraModel::default())
+        });
+    assert_eq!(first, same);
+    assert_ne!(first, other_seed);
+    assert_ne!(first, other_frame);
 }
 
 #[test]

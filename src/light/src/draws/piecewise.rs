@@ -1,4 +1,4 @@
-//! Piecewise linear approximation of a function of a positive number: [`Piecewise`].
+//! Piecewise linear table of a function of positive numbers: [`Piecewise`].
 
 use super::lanes::{LANES, Lanes};
 
@@ -9,11 +9,10 @@ const WITHIN: u32 = 23 - PIECES.ilog2();
 /// Octaves that a table covers.
 const OCTAVES: usize = 32;
 
-/// Function over 32 octaves of its argument, as 128 straight pieces per octave.
+/// Piecewise linear table of a function: 32 octaves of the argument, 128 pieces per octave.
 ///
-/// The pieces of an octave have equal width, so that the width shrinks with the argument. A curve like a logarithm or a
-/// power therefore has the same relative accuracy everywhere, also at its steep end. The error of a piece is at most
-/// f″(x) x² / 8 · 2⁻¹⁴: 8·10⁻⁶ for a logarithm.
+/// The pieces of an octave have equal width, so that pieces are narrower for smaller arguments, and logarithms and powers have
+/// the same relative accuracy everywhere. The error of a piece is at most f″(x) x² / 8 · 2⁻¹⁴: 8·10⁻⁶ for a logarithm.
 #[derive(Debug, Clone)]
 pub(crate) struct Piecewise {
     /// Upper bits of the lower end of the domain, where the first piece begins.
@@ -27,14 +26,10 @@ impl Piecewise {
     #[must_use]
     pub(crate) fn new(exponent: i32, function: impl Fn(f64) -> f64) -> Self {
         let base = libm::ldexp(1.0, exponent);
-        let begin = |piece: usize| {
-            let octave = (1_u64 << (piece / PIECES)) as f64;
-            function(base * octave * (1.0 + (piece % PIECES) as f64 / PIECES as f64))
-        };
         let mut pieces = vec![[0.0; 2]; OCTAVES * PIECES];
-        let mut value = begin(0);
+        let mut value = function(piece_start(base, 0));
         for (index, piece) in pieces.iter_mut().enumerate() {
-            let next = begin(index + 1);
+            let next = function(piece_start(base, index + 1));
             *piece = [
                 value as f32,
                 ((next - value) / f64::from(1 << WITHIN)) as f32,
@@ -49,11 +44,11 @@ impl Piecewise {
         }
     }
 
-    /// The function at each of a batch of numbers, which must be in the domain.
+    /// The values of the function for a batch of numbers, which must be in the domain.
     #[inline(always)]
     #[must_use]
     pub(crate) fn lanes(&self, x: &Lanes<f32>) -> Lanes<f32> {
-        // Piece and position are loaded apart from the arithmetic, whose loops are vector instructions.
+        // The table is read in a separate loop, so that the loop with the arithmetic is vectorized.
         let mut pieces = [[0.0; 2]; LANES];
         for (piece, x) in pieces.iter_mut().zip(x) {
             *piece = self.pieces[self.piece(x.to_bits())];
@@ -71,13 +66,19 @@ impl Piecewise {
         (bits >> WITHIN).wrapping_sub(self.first) as usize % (OCTAVES * PIECES)
     }
 
-    /// The function at `x`, which must be in the domain.
+    /// The value of the function at `x`, which must be in the domain.
     #[inline(always)]
     #[must_use]
     pub(crate) fn at(&self, x: f32) -> f32 {
         let [value, rise] = self.pieces[self.piece(x.to_bits())];
         value + rise * within(x.to_bits())
     }
+}
+
+/// Argument at the start of a piece, in a table from `base` on.
+fn piece_start(base: f64, piece: usize) -> f64 {
+    let octave = (1_u64 << (piece / PIECES)) as f64;
+    base * octave * (1.0 + (piece % PIECES) as f64 / PIECES as f64)
 }
 
 /// Position of a number within its piece, from its bits.
@@ -101,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn pieces_meet_the_function_where_they_begin() {
+    fn pieces_equal_the_function_at_their_start() {
         let table = Piecewise::new(0, |x| x * x);
         for x in [1.0, 1.0078125, 1.5, 2.0, 1024.0, 4_278_190_080.0] {
             assert!((table.at(x) / (x * x) - 1.0).abs() < 1e-7);

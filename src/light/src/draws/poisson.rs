@@ -1,9 +1,9 @@
-//! Poisson numbers, each from two words of 32 random bits: [`lanes`].
+//! Poisson-distributed numbers, each from two words of 32 random bits: [`lanes`].
 //!
-//! A mean below 48 is split into a multiple of ½ and a rest. The sum of their Poisson numbers is a Poisson number of the
-//! mean: the first is looked up in Walker's alias table, the second is counted. From 48 on, the quantile function is
-//! expanded about the normal one. Below 48 the distribution is exact to 2⁻³². At 48 its total variation error is 5·10⁻⁶,
-//! and less for larger means (a χ² test would detect it after 10⁹ draws).
+//! A mean below 48 is split into a multiple of ½ and a rest, because the sum of Poisson numbers of both parts is a Poisson number of
+//! the mean. The number of the multiple is looked up in Walker's alias table; the number of the rest is found by inversion. From 48 on,
+//! the quantile function is approximated by an expansion about the normal quantile. Below 48 the distribution is exact to 2⁻³². At 48 the
+//! total variation error is 5·10⁻⁶, and smaller for larger means (a χ² test would detect it after 10⁹ draws).
 
 use std::sync::LazyLock;
 
@@ -14,7 +14,7 @@ use super::quantile::NORMAL;
 const EXPANDED_FROM: f32 = 48.0;
 /// Alias tables: one for each multiple of ½ below 48, padded to a power of two.
 const TABLES: usize = 128;
-/// Slots of a table: one for each number from 0 to 127.
+/// Slots of a table, one for each number from 0 to 127.
 const SLOTS: usize = 128;
 const SLOT_BITS: u32 = SLOTS.ilog2();
 /// Bits of a word that give its position within a slot.
@@ -145,7 +145,7 @@ fn bound_of_4(x: f32) -> f32 {
     (x * x) * (x * x) * (1.0 / 24.0)
 }
 
-/// Excess over 3: the number of k from 4 on with `uniform` < P(N ≥ k).
+/// Excess over 3: the number of k ≥ 4 with `uniform` < P(N ≥ k).
 fn beyond_3(mean: f64, uniform: f64) -> f32 {
     let mut term = libm::exp(-mean) * mean * mean * mean / 6.0;
     let mut count = 0.0_f32;
@@ -189,8 +189,8 @@ fn expanded(means: &Lanes<f32>, words: &Lanes<u32>) -> Lanes<f32> {
     numbers
 }
 
-/// For each multiple of ½, slots of equal width for the numbers 0 to 127. The lower part of a slot stands for its own
-/// number, the rest for another, the alias. An entry is the width of the lower part, followed by 7 bits of the alias.
+/// Alias tables by multiple of ½: slots of equal width for the numbers 0 to 127. The lower part of a slot yields its own number, the
+/// upper part another number, the alias. An entry consists of the width of the lower part and 7 bits of the alias.
 static ALIAS_TABLES: LazyLock<Vec<u32>> = LazyLock::new(|| {
     let mut tables = vec![0; TABLES * SLOTS];
     for (index, table) in tables.as_chunks_mut::<SLOTS>().0.iter_mut().enumerate() {
@@ -201,7 +201,7 @@ static ALIAS_TABLES: LazyLock<Vec<u32>> = LazyLock::new(|| {
     tables
 });
 
-/// Walker's alias table for a mean, built by Vose's method in integers: probabilities are multiples of 2⁻³² that sum to 1.
+/// Walker's alias table for a mean, built by Vose's method in integers. Probabilities are multiples of 2⁻³² whose sum is 1.
 fn alias_table(mean: f64) -> [u32; SLOTS] {
     const WIDTH: u64 = 1 << POSITION_BITS;
     let mut probability = libm::exp(-mean);
@@ -216,7 +216,7 @@ fn alias_table(mean: f64) -> [u32; SLOTS] {
     let mode = mean as usize;
     parts[mode] = parts[mode].wrapping_add(remainder);
 
-    // A full slot stands for its own number alone: its alias is itself.
+    // Initially all slots are full: each yields only its own number, so its alias is itself.
     let mut table: [u32; SLOTS] = std::array::from_fn(|slot| slot as u32);
     let (mut small, mut large): (Vec<_>, Vec<_>) =
         (0..SLOTS).partition(|slot| parts[*slot] < WIDTH);

@@ -1,4 +1,4 @@
-//! Distributions symmetric about zero, sampled by their quantile functions: [`Quantile`].
+//! Tabulated quantile functions of distributions symmetric about zero: [`Quantile`].
 
 use std::cell::RefCell;
 use std::sync::{Arc, LazyLock};
@@ -6,20 +6,19 @@ use std::sync::{Arc, LazyLock};
 use super::lanes::{LANES, Lanes};
 use super::piecewise::Piecewise;
 
-/// The largest single-precision number below 2^31.
-const LAST: f32 = 2_147_483_520.0;
+/// Largest single-precision number below 2^31.
+const MAX_POSITION: f32 = 2_147_483_520.0;
 
-/// Quantile function with Q(1 − u) = −Q(u), tabulated on the lower half, u = (m + ½) · 2⁻³² for m below 2^31.
-///
-/// The smallest u is 2⁻³³.
+/// Tabulated quantile function with Q(1 − u) = −Q(u). The table covers the lower half, u = (m + ½) · 2⁻³² for m from 0 to 2^31 − 1.
 #[derive(Debug, Clone)]
 pub struct Quantile(Piecewise);
 
-/// Most tables that a thread keeps; the built-in calibrations have at most 11 shapes each.
-const KEPT_TABLES: usize = 16;
+/// Maximum number of tables that a thread caches; each built-in calibration has at most 11 shapes.
+const MAX_CACHED_TABLES: usize = 16;
 
 thread_local! {
-    /// Bits of shapes λ with their tables, the last one last. Each thread has its own, because a fork could find a shared one locked.
+    /// Cached tables with the bits of their shape λ, in order of insertion. The cache is per thread, because after a fork a shared one
+    /// could stay locked.
     static TUKEY_LAMBDA: RefCell<Vec<(u64, Arc<Quantile>)>> = const { RefCell::new(Vec::new()) };
 }
 
@@ -31,7 +30,7 @@ impl Quantile {
     #[must_use]
     pub fn new(function: impl Fn(f64) -> f64) -> Self {
         let cell = libm::ldexp(1.0, -32);
-        Self(Piecewise::new(-1, |place| function(place * cell)))
+        Self(Piecewise::new(-1, |position| function(position * cell)))
     }
 
     /// Quantile function of Tukey's λ distribution, with shape λ.
@@ -40,14 +39,14 @@ impl Quantile {
         Self::new(|u| tukey_lambda(u, shape))
     }
 
-    /// The same from the tables that this thread keeps. A table is a twentieth of the work of a small image.
-    pub(crate) fn kept_tukey_lambda(shape: f64) -> Arc<Self> {
+    /// [`Self::tukey_lambda`] from the cache of this thread. Making a table takes a twentieth of the time of a small image.
+    pub(crate) fn cached_tukey_lambda(shape: f64) -> Arc<Self> {
         let bits = shape.to_bits();
         TUKEY_LAMBDA.with_borrow_mut(|tables| {
-            if let Some((_, table)) = tables.iter().find(|(kept, _)| *kept == bits) {
+            if let Some((_, table)) = tables.iter().find(|(cached, _)| *cached == bits) {
                 return Arc::clone(table);
             }
-            if tables.len() == KEPT_TABLES {
+            if tables.len() == MAX_CACHED_TABLES {
                 tables.remove(0);
             }
             let table = Arc::new(Self::tukey_lambda(shape));
@@ -60,18 +59,18 @@ impl Quantile {
     #[inline(always)]
     #[must_use]
     pub fn at(&self, word: u32) -> f32 {
-        signed(self.0.at(place_of(word)), word)
+        signed(self.0.at(position(word)), word)
     }
 
     /// The quantiles of a batch of words.
     #[inline(always)]
     #[must_use]
     pub fn lanes(&self, words: &Lanes<u32>) -> Lanes<f32> {
-        let mut places = [0.0; LANES];
-        for (place, word) in places.iter_mut().zip(words) {
-            *place = place_of(*word);
+        let mut positions = [0.0; LANES];
+        for (target, word) in positions.iter_mut().zip(words) {
+            *target = position(*word);
         }
-        let mut numbers = self.0.lanes(&places);
+        let mut numbers = self.0.lanes(&positions);
         for (number, word) in numbers.iter_mut().zip(words) {
             *number = signed(*number, *word);
         }
@@ -79,14 +78,18 @@ impl Quantile {
     }
 }
 
-/// The place on the lower half that 31 bits of a word stand for.
+/// The position on the lower half, in units of 2⁻³², from 31 bits of a word.
 #[inline(always)]
-fn place_of(word: u32) -> f32 {
-    let place = (word & 0x7FFF_FFFF).cast_signed() as f32 + 0.5;
-    if place < LAST { place } else { LAST }
+fn position(word: u32) -> f32 {
+    let position = (word & 0x7FFF_FFFF).cast_signed() as f32 + 0.5;
+    if position < MAX_POSITION {
+        position
+    } else {
+        MAX_POSITION
+    }
 }
 
-/// A quantile of the lower half, or of the upper half, by the first bit of a word.
+/// Negates a quantile of the lower half if the highest bit of a word is set.
 #[inline(always)]
 fn signed(lower: f32, word: u32) -> f32 {
     f32::from_bits(lower.to_bits() ^ (word & 0x8000_0000))
@@ -95,7 +98,7 @@ fn signed(lower: f32, word: u32) -> f32 {
 /// The quantile function of Tukey's λ distribution, (u^λ − (1 − u)^λ) / λ and ln u − ln(1 − u) at λ = 0, for u in the
 /// open interval (0, 1).
 ///
-/// It is computed as a difference of exp(λ ln u) − 1, which stays accurate for every λ near 0.
+/// The difference of two terms exp(λ ln u) − 1 is accurate for every λ near 0.
 #[must_use]
 pub fn tukey_lambda(u: f64, shape: f64) -> f64 {
     let (below, above) = (libm::log(u), libm::log1p(-u));
@@ -108,12 +111,10 @@ pub fn tukey_lambda(u: f64, shape: f64) -> f64 {
 
 /// The quantile function of the standard normal distribution on (0, ½], by Newton's method on its distribution function.
 fn standard_normal(u: f64) -> f64 {
-    let density = |z: f64| libm::exp(-0.5 * z * z) / (2.0 * std::f64::consts::PI).sqrt();
-    let distribution = |z: f64| 0.5 * libm::erfc(-z / std::f64::consts::SQRT_2);
-    // ln Φ is concave: from the left of the root, Newton's steps on it never overshoot and soon converge quadratically.
+    // ln Φ is concave: from the left of the root, Newton's method never overshoots and converges quadratically.
     let mut z = -(-2.0 * libm::log(u)).sqrt();
     for _ in 0..60 {
-        let step = libm::log(distribution(z) / u) * distribution(z) / density(z);
+        let step = libm::log(normal_cdf(z) / u) * normal_cdf(z) / normal_density(z);
         z -= step;
         if step.abs() < 1e-13 {
             break;
@@ -122,12 +123,20 @@ fn standard_normal(u: f64) -> f64 {
     z
 }
 
+fn normal_density(z: f64) -> f64 {
+    libm::exp(-0.5 * z * z) / (2.0 * std::f64::consts::PI).sqrt()
+}
+
+fn normal_cdf(z: f64) -> f64 {
+    0.5 * libm::erfc(-z / std::f64::consts::SQRT_2)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn the_quantile_function_is_the_closed_form() {
+    fn tukey_lambda_follows_the_closed_form() {
         let u = [1e-5, 1e-3, 0.01, 0.25, 0.5, 0.75, 0.99, 0.999, 1.0 - 1e-5];
         for shape in [
             -1.0 / 7.0,
@@ -155,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn normal_quantiles_are_the_published_ones() {
+    fn normal_quantiles_equal_published_values() {
         for (u, z) in [
             (0.5, 0.0),
             (0.25, -0.674_489_750_196_082),

@@ -1,7 +1,7 @@
-//! Random numbers of the synthesis: [`NoiseKey`], [`Stream`], [`Site`].
+//! Counter-based random numbers: [`NoiseKey`], [`Stream`], [`Site`].
 //!
-//! A draw is a pure function of (seed, frame, component, sensor row, sensor column, index of the draw): there is no state
-//! that threads or order could change. The generator is Philox4x32-10 (Salmon et al., "Parallel random numbers:
+//! A draw is a pure function of (seed, frame, component, sensor row, sensor column, index of the draw), so that it does not depend
+//! on threads or order. The generator is Philox4x32-10 (Salmon et al., "Parallel random numbers:
 //! as easy as 1, 2, 3", SC 2011), which passes BigCrush on plain counters; its key is taken from a BLAKE3 digest.
 
 use std::convert::Infallible;
@@ -15,16 +15,16 @@ use super::lanes::{LANES, Lanes};
 use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{Digest, FrameId, Severity};
 
-/// Key of a frame's random numbers, made from the run's seed and the frame's name.
+/// Key of a frame's random numbers, derived from the seed of the run and the name of the frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct NoiseKey {
     noise: Digest,
-    /// Key of the camera's state; differs from `noise` if one camera took several frames.
+    /// Key of the camera's state; differs from `noise` if several frames share a camera.
     camera: Digest,
 }
 
 impl NoiseKey {
-    /// The key of a frame under a seed.
+    /// The key of a frame for a seed.
     #[must_use]
     pub fn new(seed: u64, frame: &FrameId) -> Self {
         let parts: [&[u8]; 3] = [
@@ -39,8 +39,7 @@ impl NoiseKey {
         }
     }
 
-    /// The key of the same frame, taken with the camera of a walk: the noise of this frame, but the camera's state from the
-    /// walk's key.
+    /// Replaces the camera's state by that of a walk; the noise of the frame stays.
     #[must_use]
     pub fn with_camera_of(self, walk: &Self) -> Self {
         Self {
@@ -49,19 +48,17 @@ impl NoiseKey {
         }
     }
 
-    /// The key of the same frame for one severity, so that its noise differs from that of others. It depends on the label,
+    /// The key of the same frame at one severity, whose noise is independent of other severities. It is derived from the label, such as
     /// `L3` or `E3.3`.
     #[must_use]
     pub fn at(&self, severity: Severity) -> Self {
         let level = Kind::Sensor.label(severity);
-        let at = |digest: &Digest| Digest::from_parts([digest.as_bytes(), level.as_bytes()]);
-        Self {
-            noise: at(&self.noise),
-            camera: at(&self.camera),
-        }
+        let [noise, camera] = [self.noise, self.camera]
+            .map(|digest| Digest::from_parts([digest.as_bytes(), level.as_bytes()]));
+        Self { noise, camera }
     }
 
-    /// The random numbers of one component, independent of those of the others.
+    /// The random numbers of one component, independent of all other components.
     #[must_use]
     pub fn stream(&self, component: Component) -> Stream {
         let key = match component {
@@ -82,7 +79,7 @@ impl NoiseKey {
     }
 }
 
-/// Purpose of random numbers; each has another stream.
+/// Purpose of random numbers; each purpose has its own stream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Component {
     /// The state of the camera.
@@ -91,16 +88,16 @@ pub enum Component {
     Row,
     /// Numbers of each sensor site: see [`RandomField`].
     RandomField,
-    /// Noise that an enhancer takes as an input.
+    /// Noise input of an enhancer.
     ModelInput,
-    /// Frames that a bootstrap draws.
+    /// Frames drawn by a bootstrap.
     Resamples,
     /// The direction in which the camera turns.
     Motion,
 }
 
 impl Component {
-    /// Name that enters the stream's key, so that adding or moving a component does not change the others' draws.
+    /// Name that enters the key of the stream. Adding or reordering components does not change the draws of others.
     fn name(self) -> &'static str {
         match self {
             Self::Camera => "camera",
@@ -113,7 +110,7 @@ impl Component {
     }
 }
 
-/// Words of 32 random bits for [`LANES`] sites of one sensor row, one word per site and use.
+/// Random words of 32 bits for [`LANES`] sites of one sensor row, one word per site and use.
 #[derive(Debug, Clone)]
 pub struct RandomField {
     /// Two words per site for shot noise.
@@ -176,7 +173,7 @@ impl Stream {
         field
     }
 
-    /// The words of one site as a generator for the distributions of `rand`.
+    /// A generator of the words of one site, for the distributions of `rand`.
     #[must_use]
     pub fn at(self, site: Site) -> SiteWords {
         SiteWords {
@@ -187,7 +184,7 @@ impl Stream {
     }
 }
 
-/// Generator of the words of one site, for numbers that are not drawn for every site of the sensor.
+/// Generator of the words of one site, for numbers that are drawn once per frame or row.
 #[derive(Debug, Clone)]
 pub struct SiteWords {
     stream: Stream,
@@ -248,7 +245,7 @@ mod tests {
         NoiseKey::new(seed, &FrameId(frame.to_owned()))
     }
 
-    /// The known answers that come with Random123, the authors' library.
+    /// Known answers from Random123, the library of the authors.
     #[test]
     fn philox_gives_the_known_answers() {
         let cases = [
@@ -273,8 +270,8 @@ mod tests {
         }
     }
 
-    /// Uniform numbers are middles of 2^52 equal cells of (0, 1), so that both u and 1 − u are exact. With 53 bits, the last
-    /// one would round to 1, where the quantile functions are infinite.
+    /// Uniform numbers are the middles of 2^52 equal cells of (0, 1), so that both u and 1 − u are exact. With 53 bits, the largest
+    /// number would round to 1, where the quantile functions are infinite.
     #[test]
     fn unit_numbers_are_the_middles_of_cells() {
         let stream = key(5, "frame").stream(Component::Camera);
@@ -298,10 +295,9 @@ mod tests {
         assert_ne!(first, key(7, "a").stream(Component::Row));
     }
 
-    /// Each bit of the words is 1 for half of the sites, and words of neighbouring sites, rows, draws or uses differ in half
-    /// of their bits (5 sigma).
+    /// Each bit is 1 for half of the sites, and words of neighbouring sites, rows, draws or uses differ in half of their bits (5 sigma).
     #[test]
-    fn bits_are_even_and_neighbours_unrelated() {
+    fn bits_are_balanced_and_neighbours_independent() {
         let stream = key(1, "frame").stream(Component::RandomField);
         let (rows, columns) = (256, 512);
         let mut ones = [[0u32; 32]; 4];
@@ -348,20 +344,20 @@ mod tests {
         }
     }
 
-    /// χ² test over 64 × 64 cells of a number and its right neighbour: they are uniform and independent.
+    /// χ² test over 64 × 64 cells of a number and its right neighbour.
     #[test]
-    fn pairs_of_neighbours_fill_the_square_evenly() {
+    fn neighbours_are_uniform_and_independent() {
         const CELLS: usize = 64;
         let stream = key(2, "frame").stream(Component::RandomField);
         let mut cells = vec![0u32; CELLS * CELLS];
         let n = 400_000;
         for i in 0..n {
             let (row, column) = (i / 1000, i % 1000);
-            let at = |column| {
+            let [left, right] = [2 * column, 2 * column + 1].map(|column| {
                 let unit: f64 = Open01.sample(&mut stream.at(Site::new(row, column)));
                 (unit * CELLS as f64) as usize
-            };
-            cells[at(2 * column) * CELLS + at(2 * column + 1)] += 1;
+            });
+            cells[left * CELLS + right] += 1;
         }
         let expected = f64::from(n as u32) / cells.len() as f64;
         let chi: f64 = cells

@@ -1,14 +1,14 @@
-//! Motion blur in linear light: [`blur`], and [`blurred_codes`] for a picture that is otherwise as it was.
+//! Motion blur in linear light: [`blur`] returns light, [`blurred_codes`] 8-bit codes.
 //!
-//! Each sample is the mean of the light along the [path](Streak). Beyond an edge of the picture stands the edge's own pixel.
-//! Rows do not depend on each other. Along a row all inner weights are equal; their sum is made of sums of 1, 2, 4 … pixels,
-//! which takes few additions at any length. Along other paths the weighted pixels are added in the order of their offsets.
+//! Each sample is the weighted mean of the light along the [path](Streak); edge pixels are repeated beyond the edges. Rows are
+//! independent of each other. For a path along a row, all inner weights are equal, and their sum is combined from sums of 1, 2, 4 …
+//! pixels, which takes few additions at any length. For other paths, the weighted pixels are added in the order of their offsets.
 
 use rayon::prelude::*;
 
 use super::streak::{Streak, Tap};
 use crate::clean::Clean;
-use crate::codes::{encode, shown_light};
+use crate::codes::{display_light, encode};
 use crate::curve;
 use crate::draws::{LANES, Lanes};
 use darkqa_ground::types::images::{Isa, Kernel};
@@ -17,7 +17,7 @@ use darkqa_ground::types::{Light, Rgb};
 /// Version of motion blur, raised whenever a pixel changes.
 pub const VERSION: u32 = 1;
 
-/// The light of a picture, blurred along a path.
+/// Blurs an image along a path; returns linear light.
 #[must_use]
 pub fn blur(clean: Clean<'_>, streak: Streak) -> Light {
     let blur = Blur::new(clean, streak, Isa::best());
@@ -30,7 +30,7 @@ pub fn blur(clean: Clean<'_>, streak: Streak) -> Light {
     blurred
 }
 
-/// A picture blurred along a path, in 8-bit codes. Of codes that stand still, they are unchanged.
+/// Blurs an image along a path; returns 8-bit codes. Codes without motion are unchanged.
 #[must_use]
 pub fn blurred_codes<'a>(clean: impl Into<Clean<'a>>, streak: Streak) -> Rgb {
     let clean = clean.into();
@@ -55,46 +55,46 @@ pub fn blurred_codes<'a>(clean: impl Into<Clean<'a>>, streak: Streak) -> Rgb {
     blurred
 }
 
-/// The light of a picture and the weights of a path, ready for any row.
+/// The light of an image and the weights of a path, prepared for blurring any row.
 struct Blur {
-    /// Light in rows of `stride` samples: the picture with the edge pixels repeated in a margin on both sides.
+    /// Light in rows of `stride` samples: the image with its edge pixels repeated in a margin on both sides.
     light: Vec<f32>,
     height: usize,
     stride: usize,
-    /// Pixels of a margin.
+    /// Width of a margin, in pixels.
     margin: usize,
     weights: Weights,
     isa: Isa,
 }
 
-/// How the weighted pixels of a path are summed.
+/// Weights of a path, by the method of summation.
 #[derive(Debug)]
 enum Weights {
-    /// One by one.
+    /// Any path: taps are added one by one.
     Each(Vec<Tap>),
-    /// Along a row.
+    /// A path along a row: equal weights are added by partial sums.
     Row(RowWeights),
 }
 
 /// The weights of a path along a row.
 #[derive(Debug)]
 struct RowWeights {
-    /// Number of pixels in the middle that have one weight; odd.
+    /// Number of pixels in the middle with equal weight; odd.
     equal: usize,
-    /// This weight.
+    /// The weight of each of these pixels.
     weight: f32,
-    /// The weights of the other pixels by their distance from the middle, on both sides.
+    /// The other pixels: distance from the middle, and the weight on both sides.
     pairs: Vec<(usize, f32)>,
 }
 
-/// Smallest number of equal weights for which sums of sums take less time; chosen.
-const FEWEST_EQUAL: usize = 5;
+/// Smallest number of equal weights for which partial sums are faster; chosen.
+const MIN_EQUAL: usize = 5;
 
 impl Weights {
     fn from_streak(streak: Streak) -> Self {
         let taps = streak.taps();
         match RowWeights::from_taps(&taps) {
-            Some(row) if row.equal >= FEWEST_EQUAL => Self::Row(row),
+            Some(row) if row.equal >= MIN_EQUAL => Self::Row(row),
             _ => Self::Each(taps),
         }
     }
@@ -115,11 +115,12 @@ impl RowWeights {
             .iter()
             .take_while(|weight| (*weight - half[0]).abs() < 1e-12)
             .count();
-        let pairs = (inner..half.len()).map(|at| (at, half[at] as f32));
         Some(Self {
             equal: 2 * inner - 1,
             weight: half[0] as f32,
-            pairs: pairs.collect(),
+            pairs: (inner..half.len())
+                .map(|distance| (distance, half[distance] as f32))
+                .collect(),
         })
     }
 }
@@ -127,20 +128,23 @@ impl RowWeights {
 /// Buffers of one thread.
 #[derive(Debug, Default)]
 struct Scratch {
-    /// Where the light of each tap begins, and its weight.
-    places: Vec<(usize, f32)>,
-    /// Sums of 1, 2, 4 … pixels.
+    /// Index in the light of each tap for the first pixel of a row, and its weight.
+    starts: Vec<(usize, f32)>,
+    /// Partial sums of 1, 2, 4 … pixels.
     sums: Vec<f32>,
 }
 
 impl Blur {
     fn new(clean: Clean<'_>, streak: Streak, isa: Isa) -> Self {
         let taps = streak.taps();
-        let reach = taps.iter().map(|tap| tap.offset[0].unsigned_abs()).max();
-        let margin = reach.unwrap_or_default();
+        let margin = taps
+            .iter()
+            .map(|tap| tap.offset[0].unsigned_abs())
+            .max()
+            .unwrap_or_default();
         let (height, width) = (clean.height(), clean.width());
         let stride = 3 * (width + 2 * margin);
-        // Whole lanes are read; the last of them extend beyond the row.
+        // Kernels read whole lanes, which may extend beyond the last row.
         let mut light = vec![0.0; height * stride + 2 * LANES];
         light[..height * stride]
             .par_chunks_mut(stride)
@@ -150,7 +154,7 @@ impl Blur {
                 let inside = &mut padded[3 * margin..3 * (margin + width)];
                 match clean {
                     Clean::Codes(codes) => {
-                        let shown = shown_light();
+                        let shown = display_light();
                         for (light, code) in inside.iter_mut().zip(&codes.samples()[samples]) {
                             *light = shown[usize::from(*code)];
                         }
@@ -180,8 +184,8 @@ impl Blur {
     fn row(&self, row: usize, scratch: &mut Scratch, blurred: &mut [f32]) {
         match &self.weights {
             Weights::Each(taps) => {
-                scratch.places.clear();
-                scratch.places.extend(taps.iter().map(|tap| {
+                scratch.starts.clear();
+                scratch.starts.extend(taps.iter().map(|tap| {
                     let [right, down] = tap.offset;
                     let row = row.saturating_add_signed(down).min(self.height - 1);
                     let column = self.margin.saturating_add_signed(right);
@@ -189,7 +193,7 @@ impl Blur {
                 }));
                 self.isa.run(EachTap {
                     light: &self.light,
-                    places: &scratch.places,
+                    starts: &scratch.starts,
                     blurred,
                 });
             }
@@ -207,7 +211,7 @@ impl Blur {
     }
 }
 
-/// Fills both margins of a row with the picture's first and last pixel.
+/// Fills both margins of a row with its first and last pixel.
 fn repeat_edges(padded: &mut [f32], margin: usize) {
     let pixels = padded.as_chunks_mut::<3>().0;
     let (first, last) = (pixels[margin], pixels[pixels.len() - margin - 1]);
@@ -216,7 +220,7 @@ fn repeat_edges(padded: &mut [f32], margin: usize) {
     pixels[end..].fill(last);
 }
 
-/// The lanes of `light` from a place on.
+/// Copies one batch of lanes from an index on.
 #[inline(always)]
 fn lanes(light: &[f32], from: usize) -> Lanes<f32> {
     let mut lanes = [0.0; LANES];
@@ -224,11 +228,11 @@ fn lanes(light: &[f32], from: usize) -> Lanes<f32> {
     lanes
 }
 
-/// A row of sums of weighted pixels.
+/// Kernel that blurs one row tap by tap.
 struct EachTap<'a> {
     light: &'a [f32],
-    /// Where the light of each tap begins for the first pixel of the row, and its weight.
-    places: &'a [(usize, f32)],
+    /// Index in `light` of each tap for the first pixel of the row, and its weight.
+    starts: &'a [(usize, f32)],
     blurred: &'a mut [f32],
 }
 
@@ -237,8 +241,8 @@ impl Kernel for EachTap<'_> {
     fn run(self) {
         for (index, blurred) in self.blurred.chunks_mut(LANES).enumerate() {
             let mut sum = [0.0; LANES];
-            for (place, weight) in self.places {
-                let light = lanes(self.light, place + index * LANES);
+            for (start, weight) in self.starts {
+                let light = lanes(self.light, start + index * LANES);
                 for i in 0..LANES {
                     sum[i] += weight * light[i];
                 }
@@ -248,9 +252,9 @@ impl Kernel for EachTap<'_> {
     }
 }
 
-/// A row blurred along itself.
+/// Kernel that blurs one row along itself.
 struct AlongRow<'a> {
-    /// The row with its margins, and two lanes more.
+    /// The row with its margins, and two more batches of lanes.
     light: &'a [f32],
     margin: usize,
     weights: &'a RowWeights,
@@ -266,7 +270,7 @@ impl Kernel for AlongRow<'_> {
             weight,
             pairs,
         } = self.weights;
-        // The sums begin at the leftmost of the equal pixels. A sum of `size` pixels stands where its first pixel is.
+        // The sums start at the leftmost of the equal pixels. A sum of `size` pixels is stored at the position of its first pixel.
         let first = 3 * (self.margin - equal / 2);
         let mut needed = self.blurred.len() + 3 * (equal - 1);
         self.sums[..needed].copy_from_slice(&self.light[first..first + needed]);
@@ -306,7 +310,7 @@ impl Kernel for AlongRow<'_> {
     }
 }
 
-/// Adds to each of the first `needed` sums the one that is `distance` samples to the right.
+/// Doubles the length of the first `needed` sums: adds to each the sum `distance` samples to its right.
 #[inline(always)]
 fn double(sums: &mut [f32], distance: usize, needed: usize) {
     for at in (0..needed).step_by(LANES) {

@@ -1,4 +1,4 @@
-//! How the camera moves during an exposure: [`Motion`].
+//! Rotation of the camera during an exposure: [`Motion`].
 
 use std::fmt;
 use std::str::FromStr;
@@ -11,32 +11,32 @@ use crate::draws::{Component, NoiseKey, Site};
 use darkqa_ground::error::Result;
 use darkqa_ground::types::flags::key_values::{number, pairs};
 
-/// The turn of a camera (`--motion`).
+/// Rotation of the camera (`--motion`).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Motion {
     /// Angular speed, in degrees per second.
     pub speed: f64,
-    /// Horizontal field of view of cameras whose focal length is not known, in degrees.
+    /// Horizontal field of view for frames of unknown focal length, in degrees.
     pub hfov: f64,
-    /// Direction in which the picture moves.
+    /// Direction in which the image moves on the sensor.
     pub angle: MotionAngle,
 }
 
-/// Direction in which a picture moves.
+/// Direction in which an image moves on the sensor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum MotionAngle {
-    /// In degrees, from along a row (0, the camera turns to the side) towards down a column (90, it nods).
+    /// In degrees: 0 is along a row (the camera turns to the side), 90 is down a column (the camera nods).
     Degrees(f64),
-    /// Uniform over all directions, drawn for each frame.
+    /// Random for each frame, uniform over all directions.
     Random,
 }
 
-/// A frame as the camera saw it.
+/// Geometry of a frame that decides its motion blur.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct FrameView {
     /// Width of the image, in pixels.
     pub width: usize,
-    /// Focal length along a row, in pixels of this image; `None` if the data set does not state it.
+    /// Horizontal focal length, in pixels of this image; `None` if unknown.
     pub focal: Option<f64>,
 }
 
@@ -52,12 +52,12 @@ impl Default for Motion {
 }
 
 impl Motion {
-    /// The path of a frame's middle during an exposure of this many seconds: its length is focal length · angular speed · time.
+    /// The path of the centre of a frame during an exposure of this many seconds, of length focal length · angular speed · time.
     ///
-    /// Exact for a small turn to the side in the middle of the picture; used as an approximation for the whole picture.
+    /// Exact for small rotations at the centre of the image; used as an approximation for the whole image.
     ///
     /// # Errors
-    /// If it is longer than 256 pixels.
+    /// If the path is longer than 256 pixels.
     pub fn streak(&self, seconds: f64, view: FrameView, key: &NoiseKey) -> Result<Streak> {
         let focal = view
             .focal
@@ -66,8 +66,8 @@ impl Motion {
             MotionAngle::Degrees(angle) => angle,
             MotionAngle::Random => {
                 let mut words = key.stream(Component::Motion).at(Site::new(0, 0));
-                let share: f64 = Open01.sample(&mut words);
-                180.0 * share
+                let half_turn: f64 = Open01.sample(&mut words);
+                180.0 * half_turn
             }
         };
         Streak::new(focal * self.speed.to_radians() * seconds, angle)
@@ -107,8 +107,8 @@ impl FromStr for MotionAngle {
         if text == "random" {
             return Ok(Self::Random);
         }
-        let degrees = text.parse().ok();
-        degrees
+        text.parse()
+            .ok()
             .filter(|degrees: &f64| degrees.abs() <= 360.0)
             .map(Self::Degrees)
             .ok_or_else(|| "a number of degrees from -360 to 360, or random, expected".to_owned())
@@ -147,22 +147,32 @@ mod tests {
         focal: None,
     };
 
-    fn read(text: &str) -> Motion {
+    fn parse(text: &str) -> Motion {
         text.parse().unwrap()
+    }
+
+    fn length(motion: &str, seconds: f64, view: FrameView) -> f64 {
+        parse(motion)
+            .streak(seconds, view, &key(0, "a"))
+            .unwrap()
+            .length()
+    }
+
+    fn random_angle(seed: u64, frame: &str) -> f64 {
+        parse("angle=random")
+            .streak(0.01, VIEW, &key(seed, frame))
+            .unwrap()
+            .angle()
     }
 
     /// 30 °/s at 79°: 1.69 pixels in 1/120 s and 6.78 pixels in 1/30 s.
     #[test]
     fn the_path_is_focal_length_times_angle() {
-        let length = |motion: &str, seconds: f64, view| {
-            let streak = read(motion).streak(seconds, view, &key(0, "a"));
-            streak.unwrap().length()
-        };
         let default = "speed=30";
         assert!((length(default, 1.0 / 120.0, VIEW) - 1.694).abs() < 1e-3);
         assert!((length(default, 1.0 / 30.0, VIEW) - 6.776).abs() < 1e-3);
         assert!(length("speed=0", 1.0, VIEW).abs() < 1e-12);
-        // A known focal length counts, and the field of view does not.
+        // With a known focal length, the field of view has no effect.
         let known = FrameView {
             focal: Some(600.0),
             ..VIEW
@@ -172,35 +182,36 @@ mod tests {
             assert!((length(motion, 1.0 / 30.0, known) - expected).abs() < 1e-9);
         }
         assert!(length("hfov=150", 1.0 / 30.0, VIEW) < 2.0);
-        let error = read(default).streak(2.0, VIEW, &key(0, "a")).unwrap_err();
+        let error = parse(default).streak(2.0, VIEW, &key(0, "a")).unwrap_err();
         assert!(error.to_string().contains("at most 256"), "{error}");
     }
 
     #[test]
-    fn a_random_direction_is_that_of_its_frame() {
-        let angle = |motion: &str, seed, frame: &str| {
-            let streak = read(motion).streak(0.01, VIEW, &key(seed, frame));
-            streak.unwrap().angle()
-        };
-        assert!((angle("angle=-30.5", 0, "a") + 30.5).abs() < 1e-12);
-        let random = |seed, frame: &str| angle("angle=random", seed, frame);
-        assert_eq!(random(0, "a").to_bits(), random(0, "a").to_bits());
-        assert!((random(0, "a") - random(0, "b")).abs() > 1e-6);
-        assert!((random(0, "a") - random(1, "a")).abs() > 1e-6);
-        // Uniform over a half turn: the deviation of the mean of 400 is 2.6°.
-        let angles: Vec<f64> = (0..400).map(|i| random(i, "a")).collect();
+    fn a_random_direction_depends_on_seed_and_frame() {
+        let fixed = parse("angle=-30.5")
+            .streak(0.01, VIEW, &key(0, "a"))
+            .unwrap();
+        assert!((fixed.angle() + 30.5).abs() < 1e-12);
+        assert_eq!(
+            random_angle(0, "a").to_bits(),
+            random_angle(0, "a").to_bits()
+        );
+        assert!((random_angle(0, "a") - random_angle(0, "b")).abs() > 1e-6);
+        assert!((random_angle(0, "a") - random_angle(1, "a")).abs() > 1e-6);
+        // Uniform over a half turn: the standard error of the mean of 400 angles is 2.6°.
+        let angles: Vec<f64> = (0..400).map(|i| random_angle(i, "a")).collect();
         assert!(angles.iter().all(|angle| (0.0..180.0).contains(angle)));
         let mean = angles.iter().sum::<f64>() / 400.0;
         assert!((mean - 90.0).abs() < 13.0, "{mean}");
     }
 
     #[test]
-    fn settings_are_written_as_they_are_read() {
+    fn settings_parse_their_own_text() {
         assert_eq!(Motion::default().to_string(), "speed=30,hfov=79,angle=0");
         for text in ["speed=30,hfov=79,angle=0", "speed=0.5,hfov=60,angle=random"] {
-            assert_eq!(read(text).to_string(), text);
+            assert_eq!(parse(text).to_string(), text);
         }
-        assert_eq!(read("angle=90").to_string(), "speed=30,hfov=79,angle=90");
+        assert_eq!(parse("angle=90").to_string(), "speed=30,hfov=79,angle=90");
         for (wrong, part) in [
             ("sped=3", "did you mean speed?"),
             (

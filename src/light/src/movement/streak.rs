@@ -1,7 +1,7 @@
-//! The path of a picture during an exposure, [`Streak`], and the weights with which it is averaged.
+//! Path of an image on the sensor during an exposure ([`Streak`]), and the weights of its motion blur ([`Tap`]).
 //!
-//! The camera turns at an even speed, so the middle of the picture moves evenly on a straight line. Each point of the path
-//! spreads bilinearly over its four neighbours: a pixel at offset (i, j) has the weight
+//! The camera turns at constant speed, so that the centre of the image moves uniformly on a straight line. Each point of the path is
+//! distributed bilinearly over its four neighbours: a pixel at offset (i, j) has the weight
 //! w(i, j) = ∫₀¹ Λ(x(s) − i) · Λ(y(s) − j) ds, with Λ(t) = max(0, 1 − |t|), x(s) = ℓ cos θ (s − ½) and
 //! y(s) = ℓ sin θ (s − ½). The weights sum to 1, have the mean 0 and are symmetric, so that neither colours nor edges shift.
 
@@ -11,34 +11,34 @@ use serde::{Deserialize, Serialize};
 
 use darkqa_ground::error::{Error, Result};
 
-/// Longest path, in pixels; chosen: at a width of 4096 pixels a turn of 30°/s passes the whole ladder of exposure times (174 pixels
-/// in 1/7.5 s), and a picture that moves farther shows little but streaks.
-pub(super) const LONGEST: f64 = 256.0;
+/// Maximum length of a path, in pixels; chosen. At a width of 4096 pixels, a rotation of 30°/s stays below it at all exposure times of the
+/// ladder (174 pixels in 1/7.5 s), and images with longer paths show only streaks.
+const MAX_LENGTH: f64 = 256.0;
 
-/// Smallest weight that counts, and smallest extent of a path along an axis; smaller values are rounding errors.
-const LEAST: f64 = 1e-12;
+/// Smaller weights and extents of a path along an axis are rounding errors and ignored.
+const NEGLIGIBLE: f64 = 1e-12;
 
-/// The straight path of a picture's middle during an exposure, centred on the pixel.
+/// Straight path of the image centre during an exposure, centred on its pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Streak {
-    /// The length ℓ, in pixels.
+    /// Length ℓ, in pixels.
     length: f64,
-    /// The direction θ in degrees, from along a row towards down a column.
+    /// Direction θ in degrees: 0 is along a row, 90 is down a column.
     angle: f64,
 }
 
-/// The weight of a neighbour.
+/// Weight of a neighbouring pixel in a weighted mean.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tap {
-    /// Pixels to the right and down.
+    /// Offset to the right and down, in pixels.
     pub offset: [isize; 2],
-    /// Its weight.
+    /// Weight; all weights of a path sum to 1.
     pub weight: f64,
 }
 
 impl Streak {
-    /// A picture that stands still.
+    /// The path without motion.
     pub const STILL: Self = Self {
         length: 0.0,
         angle: 0.0,
@@ -49,9 +49,9 @@ impl Streak {
     /// # Errors
     /// If the length is not from 0 to 256 pixels, or the direction is not finite.
     pub fn new(length: f64, angle: f64) -> Result<Self> {
-        if !(0.0..=LONGEST).contains(&length) {
+        if !(0.0..=MAX_LENGTH).contains(&length) {
             let problem = format_args!(
-                "the picture would move by {length:.2} pixels during the exposure; at most {LONGEST} are possible: ask for a shorter exposure, or set a lower speed with --motion speed=…"
+                "the picture would move by {length:.2} pixels during the exposure; at most {MAX_LENGTH} are possible: ask for a shorter exposure, or set a lower speed with --motion speed=…"
             );
             return Err(Error::usage("--motion", problem));
         }
@@ -62,19 +62,19 @@ impl Streak {
         Ok(Self { length, angle })
     }
 
-    /// The length, in pixels.
+    /// Length, in pixels.
     #[must_use]
     pub fn length(self) -> f64 {
         self.length
     }
 
-    /// The direction in degrees, from along a row towards down a column.
+    /// Direction in degrees: 0 is along a row, 90 is down a column.
     #[must_use]
     pub fn angle(self) -> f64 {
         self.angle
     }
 
-    /// Whether the picture stands still.
+    /// True for a path without motion.
     #[must_use]
     pub fn is_still(self) -> bool {
         self.length <= 0.0
@@ -82,52 +82,58 @@ impl Streak {
 
     /// The weights of the neighbours, in the order of their offsets.
     ///
-    /// Between two places where x or y crosses a whole number, the weight is a quadratic of s, for which three Gauss points
-    /// are exact.
+    /// Between two points where x or y is a whole number, the weight is a quadratic polynomial of s, for which three Gauss points are
+    /// exact.
     #[must_use]
     pub fn taps(self) -> Vec<Tap> {
         let radians = self.angle.to_radians();
-        let extent = [libm::cos(radians), libm::sin(radians)].map(|share| share * self.length);
+        let extent = [libm::cos(radians), libm::sin(radians)].map(|part| part * self.length);
         let mut weights = BTreeMap::<[isize; 2], f64>::new();
-        for pair in cuts(extent).windows(2) {
+        for pair in breakpoints(extent).windows(2) {
             let [begin, end] = [pair[0], pair[1]];
-            for (node, share) in GAUSS {
+            for (node, gauss_weight) in GAUSS {
                 let s = f64::midpoint(begin, end) + node * (end - begin) / 2.0 - 0.5;
-                spread(extent.map(|extent| extent * s), |offset, weight| {
-                    *weights.entry(offset).or_default() += (end - begin) * share * weight;
+                distribute_bilinearly(extent.map(|extent| extent * s), |offset, weight| {
+                    *weights.entry(offset).or_default() += (end - begin) * gauss_weight * weight;
                 });
             }
         }
         weights
             .into_iter()
-            .filter(|(_, weight)| *weight > LEAST)
+            .filter(|(_, weight)| *weight > NEGLIGIBLE)
             .map(|(offset, weight)| Tap { offset, weight })
             .collect()
     }
 }
 
-/// Nodes in (−1, 1) and weights of Gauss and Legendre's rule with three points: ±√(3/5) and 0, with 5/18 and 8/18.
+/// Nodes in (−1, 1) and weights of the Gauss–Legendre rule with three points: ±√(3/5) and 0, with 5/18 and 8/18.
 const GAUSS: [(f64, f64); 3] = [
     (-0.774_596_669_241_483_4, 5.0 / 18.0),
     (0.0, 8.0 / 18.0),
     (0.774_596_669_241_483_4, 5.0 / 18.0),
 ];
 
-/// The shares of the path at which x or y is a whole number, with both ends, in ascending order.
-fn cuts(extent: [f64; 2]) -> Vec<f64> {
-    let mut cuts = vec![0.0, 1.0];
-    for extent in extent.into_iter().filter(|extent| extent.abs() > LEAST) {
+/// The values of s at which x or y is a whole number, and both ends 0 and 1, in ascending order.
+fn breakpoints(extent: [f64; 2]) -> Vec<f64> {
+    let mut breakpoints = vec![0.0, 1.0];
+    for extent in extent
+        .into_iter()
+        .filter(|extent| extent.abs() > NEGLIGIBLE)
+    {
         let reach = (extent.abs() / 2.0).floor() as i32;
-        let crossings = (-reach..=reach).map(|whole| f64::from(whole) / extent + 0.5);
-        cuts.extend(crossings.map(|share| share.clamp(0.0, 1.0)));
+        breakpoints.extend(
+            (-reach..=reach)
+                .map(|whole| f64::from(whole) / extent + 0.5)
+                .map(|s| s.clamp(0.0, 1.0)),
+        );
     }
-    cuts.sort_by(f64::total_cmp);
-    cuts.dedup();
-    cuts
+    breakpoints.sort_by(f64::total_cmp);
+    breakpoints.dedup();
+    breakpoints
 }
 
-/// Calls `add` with the offsets and the weights of the four pixels around a point.
-fn spread([x, y]: [f64; 2], mut add: impl FnMut([isize; 2], f64)) {
+/// Calls `add` with the offset and the bilinear weight of each of the four pixels around a point.
+fn distribute_bilinearly([x, y]: [f64; 2], mut add: impl FnMut([isize; 2], f64)) {
     let (column, row) = (x.floor(), y.floor());
     for (right, across) in [(0, 1.0 - (x - column)), (1, x - column)] {
         for (down, along) in [(0, 1.0 - (y - row)), (1, y - row)] {
@@ -152,7 +158,7 @@ mod tests {
             .collect()
     }
 
-    /// Lengths and directions of every sort: short and long, along the axes, between them, and beyond a quarter turn.
+    /// Lengths and directions: short and long, along the axes, between them, and beyond a quarter turn.
     const PATHS: [(f64, f64); 10] = [
         (0.0, 0.0),
         (0.3, 20.0),
@@ -166,7 +172,7 @@ mod tests {
         (64.0, 5.0),
     ];
 
-    /// Weights along a row, from the integral by hand.
+    /// Expected weights were integrated by hand.
     #[test]
     fn weights_along_a_row_are_exact() {
         let cases: [(f64, &[f64]); 4] = [
@@ -176,7 +182,7 @@ mod tests {
             (4.0, &[0.125, 0.25, 0.25, 0.25, 0.125]),
         ];
         for (length, expected) in cases {
-            for (angle, place) in [(0.0, 0), (90.0, 1), (180.0, 0)] {
+            for (angle, axis) in [(0.0, 0), (90.0, 1), (180.0, 0)] {
                 let found = taps(length, angle);
                 assert_eq!(
                     found.len(),
@@ -186,7 +192,7 @@ mod tests {
                 let first = -(expected.len().cast_signed() / 2);
                 for (at, expected) in (first..).zip(expected) {
                     let mut offset = [0; 2];
-                    offset[place] = at;
+                    offset[axis] = at;
                     let off = found[&offset] - expected;
                     assert!(off.abs() < 1e-12, "{length} at {angle}, {at}: {off}");
                 }
@@ -209,18 +215,17 @@ mod tests {
     }
 
     #[test]
-    fn weights_sum_to_one_about_the_middle() {
+    fn weights_sum_to_one_and_are_symmetric() {
         for (length, angle) in PATHS {
             let found = taps(length, angle);
-            let moment = |of: fn(&[isize; 2]) -> f64| -> f64 {
-                found
-                    .iter()
-                    .map(|(offset, weight)| weight * of(offset))
-                    .sum()
-            };
-            assert!((moment(|_| 1.0) - 1.0).abs() < 1e-10, "{length} at {angle}");
-            assert!(moment(|[x, _]| *x as f64).abs() < 1e-9);
-            assert!(moment(|[_, y]| *y as f64).abs() < 1e-9);
+            let (mut sum, mut mean) = (0.0, [0.0; 2]);
+            for ([x, y], weight) in &found {
+                sum += weight;
+                mean[0] += weight * *x as f64;
+                mean[1] += weight * *y as f64;
+            }
+            assert!((sum - 1.0).abs() < 1e-10, "{length} at {angle}");
+            assert!(mean[0].abs() < 1e-9 && mean[1].abs() < 1e-9);
             for ([x, y], weight) in &found {
                 let mirrored = found.get(&[-x, -y]).copied().unwrap_or_default();
                 assert!((weight - mirrored).abs() < 1e-10, "{length} at {angle}");
@@ -228,16 +233,16 @@ mod tests {
         }
     }
 
-    /// The integral in small steps, which knows nothing of pieces or of Gauss points.
+    /// Independent integration in small steps.
     #[test]
-    fn weights_are_the_integral() {
+    fn weights_equal_the_integral() {
         const STEPS: usize = 100_000;
         for (length, angle) in PATHS {
             let mut sums = BTreeMap::<[isize; 2], f64>::new();
             let radians = angle.to_radians();
             for step in 0..STEPS {
                 let along = length * ((step as f64 + 0.5) / STEPS as f64 - 0.5);
-                spread(
+                distribute_bilinearly(
                     [radians.cos() * along, radians.sin() * along],
                     |at, weight| {
                         *sums.entry(at).or_default() += weight / STEPS as f64;

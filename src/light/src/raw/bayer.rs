@@ -1,4 +1,4 @@
-//! RAW images: one sample per sensor site, under a mosaic of red, green and blue filters ([`Bayer`]).
+//! RAW images with a Bayer mosaic of colour filters, one sample per sensor site ([`Bayer`]), and their demosaicing.
 
 use rayon::prelude::*;
 
@@ -30,8 +30,8 @@ impl Plane {
 
 /// RAW image of even height and even width; black is 0, white is 1.
 ///
-/// Each row is stored plane by plane, the even columns before the odd ones. A plane is padded to a whole number of lanes,
-/// so that kernels work on whole lanes. One more sample holds the neighbour beyond the edge.
+/// Each row is stored plane by plane, the even columns before the odd ones. A plane is padded to whole batches of lanes, plus one sample
+/// for the neighbour beyond the edge.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bayer {
     height: usize,
@@ -103,7 +103,7 @@ impl Bayer {
     }
 }
 
-/// Samples of one plane in a row: whole lanes, and one sample for the neighbour beyond the edge.
+/// Number of samples of one plane in a row: whole batches of lanes, and one sample for the neighbour beyond the edge.
 fn stride(width: usize) -> usize {
     (width / 2).next_multiple_of(LANES) + 1
 }
@@ -124,7 +124,7 @@ pub struct RawRow<'a> {
 }
 
 impl RawRow<'_> {
-    /// The planes of the even and of the odd columns in whole lanes; samples beyond the width are never used.
+    /// The planes of the even and the odd columns, in whole batches of lanes; samples beyond the width are never used.
     pub fn planes(&mut self) -> [&mut [Lanes<f32>]; 2] {
         let (even, odd) = self.samples.split_at_mut(stride(self.width));
         [
@@ -133,7 +133,7 @@ impl RawRow<'_> {
         ]
     }
 
-    /// Repeats each plane's last site beyond the edge; to be called after the last change of the row.
+    /// Repeats the last site of each plane beyond the edge. Must be called after the last change of the row.
     pub fn repeat_edges(&mut self) {
         let (n, stride) = (self.width / 2, stride(self.width));
         self.samples[n] = self.samples[n - 1];
@@ -141,11 +141,10 @@ impl RawRow<'_> {
     }
 }
 
-/// Colours of the even and of the odd columns of a row, channel by channel.
+/// Colours of the even and the odd columns of a batch, channel by channel.
 pub(super) type Colours = [[Lanes<f32>; 3]; 2];
 
-/// Interpolates the `index`-th lanes of a row bilinearly from the rows above, here and below. Planes are replicated beyond
-/// their edges.
+/// Demosaics batch `index` of a row bilinearly, from the rows above, here and below. Planes repeat their last site beyond the edges.
 #[inline(always)]
 pub(super) fn demosaic(
     [above, here, below]: [Sites<'_>; 3],
@@ -235,7 +234,7 @@ mod tests {
         bayer
     }
 
-    fn interpolated(bayer: &Bayer) -> Vec<Vec<[f32; 3]>> {
+    fn demosaic_all(bayer: &Bayer) -> Vec<Vec<[f32; 3]>> {
         let last = bayer.height() - 1;
         (0..bayer.height())
             .map(|row: usize| {
@@ -257,6 +256,24 @@ mod tests {
             .collect()
     }
 
+    fn test_sample(row: usize, column: usize) -> f32 {
+        ((row * 31 + column * 17) % 64) as f32
+    }
+
+    /// The nearest row or column below `size` of the same parity.
+    fn clamp_in_plane(at: isize, size: usize) -> usize {
+        let parity = at.rem_euclid(2);
+        (at.clamp(parity, size.cast_signed() - 2 + parity)) as usize
+    }
+
+    fn channel(row: usize, column: usize) -> usize {
+        match Plane::at(row, column) {
+            Plane::R => 0,
+            Plane::Gr | Plane::Gb => 1,
+            Plane::B => 2,
+        }
+    }
+
     #[test]
     fn odd_sizes_are_covered() {
         for (size, covered) in [((1, 1), (2, 2)), ((1, 6), (2, 6)), ((5, 2), (6, 2))] {
@@ -273,7 +290,7 @@ mod tests {
                 Plane::Gr | Plane::Gb => 0.5,
                 Plane::B => 0.75,
             });
-            for pixel in interpolated(&colours).iter().flatten() {
+            for pixel in demosaic_all(&colours).iter().flatten() {
                 assert_eq!(
                     pixel.map(f32::to_bits),
                     [0.25f32, 0.5, 0.75].map(f32::to_bits)
@@ -282,22 +299,12 @@ mod tests {
         }
     }
 
-    /// Direct form of the definition: each channel of a pixel is the mean of the nearest sites of that colour. Beyond an
-    /// edge, the plane's last site is repeated.
+    /// Reference: each channel of a pixel is the mean of the nearest sites of that colour. Beyond an edge, the last site of the
+    /// plane is repeated.
     #[test]
     fn pixels_are_means_of_their_neighbours() {
         let (height, width) = (6, 132);
-        let value = |row: usize, column: usize| ((row * 31 + column * 17) % 64) as f32;
-        let found = interpolated(&filled(height, width, value));
-        let clamp = |at: isize, size: usize| {
-            let parity = at.rem_euclid(2);
-            (at.clamp(parity, size.cast_signed() - 2 + parity)) as usize
-        };
-        let channel = |row: isize, column: isize| match Plane::at(row as usize, column as usize) {
-            Plane::R => 0,
-            Plane::Gr | Plane::Gb => 1,
-            Plane::B => 2,
-        };
+        let found = demosaic_all(&filled(height, width, test_sample));
         for (row, pixels) in found.iter().enumerate() {
             for (column, pixel) in pixels.iter().enumerate() {
                 let mut sums = [[0.0f32; 2]; 3];
@@ -308,9 +315,12 @@ mod tests {
                             let [y, x] = [row.cast_signed() + down, column.cast_signed() + right];
                             let parity = [y.rem_euclid(2), x.rem_euclid(2)];
                             if down * down + right * right == distance
-                                && channel(parity[0], parity[1]) == colour
+                                && channel(parity[0] as usize, parity[1] as usize) == colour
                             {
-                                sum[0] += value(clamp(y, height), clamp(x, width));
+                                sum[0] += test_sample(
+                                    clamp_in_plane(y, height),
+                                    clamp_in_plane(x, width),
+                                );
                                 sum[1] += 1.0;
                             }
                         }

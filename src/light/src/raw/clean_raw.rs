@@ -1,4 +1,4 @@
-//! The noise-free RAW image of a frame, [`CleanRaw`], which noise of several strengths is added to.
+//! Noise-free RAW image of a frame, for adding noise of several strengths: [`CleanRaw`].
 
 use rayon::prelude::*;
 
@@ -6,21 +6,19 @@ use super::bayer::Bayer;
 use super::isp::Developer;
 use super::negative::Negative;
 use super::noise::{Noise, Term};
-use super::unprocess::unprocess_up_to;
+use super::unprocess::unprocess_with_headroom;
 use crate::camera::CameraState;
 use crate::clean::Clean;
 use crate::draws::NoiseKey;
 use crate::noise_profile::{Amplify, Tone};
 use darkqa_ground::types::images::Isa;
 
-/// Noise-free RAW image of a frame, by one camera.
-///
-/// It saves the conversion of the pixels where only the noise of the camera changes, not its colours.
+/// Noise-free RAW image of a frame by one camera. Saves the conversion of the pixels if only the noise changes, not the colours.
 #[derive(Debug)]
 pub struct CleanRaw {
     raw: Bayer,
     camera: CameraState,
-    /// How many EV above white the sensor saturates, if the frame is light in front of the camera.
+    /// Light at which the sensor saturates, in EV above white; `None` unless the frame is linear scene light.
     headroom_ev: Option<f64>,
     /// Height and width of the frame, in pixels.
     size: [usize; 2],
@@ -28,22 +26,22 @@ pub struct CleanRaw {
 
 impl CleanRaw {
     /// The noise-free RAW image of `clean` by a camera in the given state. `headroom_ev` is that of the noise profile
-    /// ([`Synthesis::headroom_ev`](crate::Synthesis::headroom_ev)); it matters for light alone.
+    /// ([`Synthesis::headroom_ev`](crate::Synthesis::headroom_ev)); it only affects linear scene light.
     #[must_use]
     pub fn new<'a>(clean: impl Into<Clean<'a>>, camera: CameraState, headroom_ev: f64) -> Self {
         let clean = clean.into();
         Self {
-            raw: unprocess_up_to(clean, &camera, headroom_ev),
+            raw: unprocess_with_headroom(clean, &camera, headroom_ev),
             camera,
             headroom_ev: matches!(clean, Clean::Scene(_)).then_some(headroom_ev),
             size: [clean.height(), clean.width()],
         }
     }
 
-    /// The negative with all terms of the noise of `state`. The matrix and the gains of its colours are not used: those of
-    /// the camera of this image are.
+    /// Adds all noise terms of `state` and returns the negative. Colour matrix and gains are those of the camera of this image, not of
+    /// `state`.
     ///
-    /// The negative equals that of [`Negative::with_state`] if the colours are the same.
+    /// Equals [`Negative::with_state`] if `state` has the same colours.
     #[must_use]
     pub fn negative(
         &self,
@@ -79,7 +77,7 @@ mod tests {
     use darkqa_ground::types::{FrameId, Light, Rgb};
 
     #[test]
-    fn negatives_are_those_of_the_frame_itself() {
+    fn negatives_equal_those_made_from_the_frame() {
         let samples = (0..21 * 35 * 3).map(|i: u32| (i.wrapping_mul(2_654_435_761) >> 24) as u8);
         let codes = Rgb::new(21, 35, samples.collect()).unwrap();
         let samples = codes.samples().iter().map(|code| f32::from(*code) / 40.0);

@@ -1,6 +1,6 @@
 //! Conversion between display colours and camera colours: [`Matrix`], [`rgb_to_camera`].
 
-/// 3 × 3 colour matrix, row by row; it is applied to a column of red, green, blue.
+/// 3 × 3 colour matrix, row by row, applied to a column vector of red, green and blue.
 pub(crate) type Matrix = [[f64; 3]; 3];
 
 /// XYZ → camera, for the four cameras of the Darmstadt Noise Dataset (Brooks et al. 2019, `random_ccm`).

@@ -1,12 +1,13 @@
-//! RAW → sRGB: the simple image processing of the paper, as a `Developer`.
+//! RAW → sRGB: the simple image processing of the paper ([`Developer`]).
 //!
-//! Two steps are not in the paper's list. The brightness gain is applied again, because the processing is "an inverse operation of
-//! unprocessing", which divides by it; the paper names white balance alone. Light is clipped to [0, 1] before demosaicing and after
-//! the matrix, as in the code of Brooks et al. 2019 (`process.py`), so that noise below 0 becomes black. `departures` measures both.
+//! Two steps are not in the list of the paper. First, the brightness gain is applied again: the paper names only white balance, but calls
+//! the processing "an inverse operation of unprocessing", which divides by this gain. Second, light is clipped to [0, 1] before
+//! demosaicing and after the matrix, as in the code of Brooks et al. 2019 (`process.py`), so that negative noise becomes black. The module
+//! `departures` measures both effects.
 //!
 //! The steps: white balance and brightness gains, clip; bilinear demosaic; camera → sRGB, clip; exposure drop; gamma
 //! compression; 8 bit. Because (2^−ΔEV · x)^(1/2.2) is 2^(−ΔEV/2.2) · x^(1/2.2), the drop is applied as a factor after the
-//! gamma, and all before it is done once for all levels.
+//! gamma compression, and all steps before it are shared by all levels.
 
 use std::sync::LazyLock;
 
@@ -42,7 +43,7 @@ fn expand(light: &Piecewise, display: f32) -> f32 {
     })
 }
 
-/// Image processing of one camera, ready for any row.
+/// Image processing of one camera, prepared for any row.
 #[derive(Debug)]
 pub(crate) struct Developer {
     /// Gain of each Bayer plane: white balance times brightness.
@@ -52,7 +53,7 @@ pub(crate) struct Developer {
     tone: Tone,
     /// Light at which the sensor saturates, in EV above white.
     headroom_ev: f64,
-    /// The same light; 1 is white.
+    /// Light at which the sensor saturates; 1 is white.
     headroom: f32,
     isa: Isa,
 }
@@ -70,8 +71,8 @@ impl Developer {
         }
     }
 
-    /// The same for light in front of a sensor that saturates this many EV above white. Display values are then in units of its
-    /// saturation, and no tone curve stands before the drop.
+    /// Prepares for linear scene light and a sensor that saturates this many EV above white. Display values are then in units of the
+    /// saturation, and no tone curve is applied before the drop.
     pub(super) fn for_linear_light(self, headroom_ev: f64) -> Self {
         let tone = match self.tone {
             Tone::BeforeEv => Tone::None,
@@ -132,7 +133,7 @@ impl Developer {
         });
     }
 
-    /// Writes the linear light of display values after an exposure drop, which the codes of [`Developer::encode`] round.
+    /// Writes the linear light of display values after an exposure drop. [`Developer::encode`] writes the same as rounded codes.
     pub(super) fn expand(&self, display: &[f32], factor: f32, light: &mut [f32]) {
         self.isa.run(Expand {
             display,
@@ -292,9 +293,9 @@ mod tests {
         Developer::new(&median(), tone, Isa::best())
     }
 
-    /// Comparison with the paper's order of operations, except where light lies on the edge between two codes.
+    /// Comparison with the order of operations of the paper, except for light at the edge between two codes.
     #[test]
-    fn codes_are_the_papers_formula() {
+    fn codes_follow_the_formula_of_the_paper() {
         for level in Severity::LADDER {
             let factor = curve::light_factor(level.value());
             let light: Vec<f32> = (0..=300_000).map(|step| step as f32 / 300_000.0).collect();

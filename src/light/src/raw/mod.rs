@@ -1,4 +1,4 @@
-//! RAW images: made from a frame, with noise, and developed.
+//! RAW images: unprocessing of frames, sensor noise, and development to sRGB.
 
 mod bayer;
 mod clean_raw;
@@ -14,4 +14,4 @@ pub(super) use bayer::Plane;
 pub use clean_raw::CleanRaw;
 #[cfg(test)]
 pub(super) use isp::Developer;
-pub use unprocess::{unprocess, unprocess_up_to};
+pub use unprocess::{unprocess, unprocess_with_headroom};

@@ -1,4 +1,4 @@
-//! The noisy RAW image of a frame, [`Negative`], which is developed at any level; or all levels at once, [`ladder`].
+//! Noisy RAW image of a frame, which can be developed at any level ([`Negative`]), and development of several levels at once ([`ladder`]).
 
 use rayon::prelude::*;
 
@@ -13,25 +13,24 @@ use crate::noise_profile::{Amplify, Coupling, Draws, Synthesis, Tone};
 use darkqa_ground::types::images::{Isa, Sample};
 use darkqa_ground::types::{Image, Rgb, Severity};
 
-/// Rows of a band, which is processed from RAW to codes within a core's cache; chosen. Images of 480, 720, 1080 or 1440 rows have an
-/// even number of bands, which two threads can share equally.
+/// Rows per band; a band is processed from RAW to codes within the cache of a core. Chosen, so that images of 480, 720, 1080 or 1440 rows
+/// have an even number of bands, which two threads share equally.
 const BAND: usize = 30;
 
-/// Noisy RAW image of a frame. Camera and noise are drawn once and shared by all levels developed from it.
-///
-/// So the levels differ in light alone. Each level has the same distribution as with separate draws.
+/// Noisy RAW image of a frame. All levels developed from it share the drawn camera and noise, and differ only in light. The distribution
+/// of each level is the same as with separate draws.
 #[derive(Debug)]
 pub struct Negative {
     developer: Developer,
     balanced: Bayer,
-    /// The only level that may be developed from it; `None` for all levels.
+    /// The only level that may be developed from this negative; `None` for all levels.
     only_level: Option<Severity>,
     /// Height and width of the frame, in pixels.
     size: [usize; 2],
 }
 
 impl Negative {
-    /// The negative of `clean` for a level, with camera and noise drawn from the key.
+    /// Makes the negative of `clean` for a level, with camera and noise drawn from the key.
     #[must_use]
     pub fn new<'a>(
         clean: impl Into<Clean<'a>>,
@@ -40,16 +39,16 @@ impl Negative {
         severity: Severity,
     ) -> Self {
         let clean = clean.into();
-        let capture = Capture::new(key, synthesis, severity, Isa::best());
-        let capture = capture.for_clean(clean, synthesis.headroom_ev(severity.value()));
+        let capture = Capture::new(key, synthesis, severity, Isa::best())
+            .for_clean(clean, synthesis.headroom_ev(severity.value()));
         Self {
             only_level: (!synthesis.shares_negative()).then_some(severity),
-            ..Self::developed_by(clean, capture)
+            ..Self::from_capture(clean, capture)
         }
     }
 
-    /// The negative of `clean` for a camera in the given state and with the given terms of noise, for all levels.
-    /// `headroom_ev` is that of the noise profile ([`Synthesis::headroom_ev`]); it matters for light alone.
+    /// Makes the negative of `clean` for a camera in the given state with the given noise terms, for all levels. `headroom_ev` is that of
+    /// the noise profile ([`Synthesis::headroom_ev`]); it only affects linear scene light.
     #[must_use]
     pub fn with_state<'a>(
         clean: impl Into<Clean<'a>>,
@@ -61,8 +60,8 @@ impl Negative {
         headroom_ev: f64,
     ) -> Self {
         let clean = clean.into();
-        let capture = Capture::with(key, state, amplify, tone, terms, Isa::best());
-        Self::developed_by(clean, capture.for_clean(clean, headroom_ev))
+        let capture = Capture::from_state(key, state, amplify, tone, terms, Isa::best());
+        Self::from_capture(clean, capture.for_clean(clean, headroom_ev))
     }
 
     /// The negative of a noisy, white-balanced RAW image that covers `size`, for all levels.
@@ -75,7 +74,7 @@ impl Negative {
         }
     }
 
-    fn developed_by(clean: Clean<'_>, capture: Capture) -> Self {
+    fn from_capture(clean: Clean<'_>, capture: Capture) -> Self {
         let (height, width) = (clean.height(), clean.width());
         let mut balanced = Bayer::covering(height, width);
         balanced
@@ -85,19 +84,19 @@ impl Negative {
         Self::from_balanced(capture.developer, balanced, [height, width])
     }
 
-    /// Whether a level may be developed from this negative.
+    /// True if a level may be developed from this negative.
     #[must_use]
-    pub fn serves(&self, severity: Severity) -> bool {
+    pub fn can_develop(&self, severity: Severity) -> bool {
         self.only_level.is_none_or(|only| only == severity)
     }
 
-    /// The sRGB image at a level.
+    /// Develops the sRGB image at a level.
     #[must_use]
     pub fn develop(&self, severity: Severity) -> Rgb {
         self.develop_by(severity.value())
     }
 
-    /// The sRGB image after any exposure drop.
+    /// Develops the sRGB image after any exposure drop.
     #[must_use]
     pub fn develop_by(&self, drop_ev: f64) -> Rgb {
         let [height, width] = self.size;
@@ -147,7 +146,7 @@ pub fn ladder<'a>(
     }
 }
 
-/// A frame after an exposure drop, with the noise of this sensor in this state of its frame.
+/// Makes the image of a frame after an exposure drop, with the noise of the camera drawn from the key.
 #[must_use]
 pub(crate) fn develop_by(
     clean: Clean<'_>,
@@ -155,14 +154,14 @@ pub(crate) fn develop_by(
     synthesis: &Synthesis,
     drop_ev: f64,
 ) -> Rgb {
-    let state = synthesis.state_by(key, drop_ev);
+    let state = synthesis.state_after_drop(key, drop_ev);
     let Synthesis { amplify, tone, .. } = *synthesis;
     let headroom = synthesis.headroom_ev(drop_ev);
     develop_with_state(clean, key, &state, amplify, tone, [drop_ev, headroom])
 }
 
-/// A frame after an exposure drop, with the noise of a camera in the given state; the drop and the headroom of the noise profile
-/// ([`Synthesis::headroom_ev`]) are in EV.
+/// Makes the image of a frame after an exposure drop, with the noise of a camera in the given state. The last argument is the drop and
+/// the headroom of the noise profile ([`Synthesis::headroom_ev`]), in EV.
 #[must_use]
 pub fn develop_with_state(
     clean: Clean<'_>,
@@ -172,34 +171,34 @@ pub fn develop_with_state(
     tone: Tone,
     [drop_ev, headroom_ev]: [f64; 2],
 ) -> Rgb {
-    let capture = Capture::with(key, state, amplify, tone, &Term::ALL, Isa::best());
-    let capture = capture.for_clean(clean, headroom_ev);
+    let capture = Capture::from_state(key, state, amplify, tone, &Term::ALL, Isa::best())
+        .for_clean(clean, headroom_ev);
     let mut image = Rgb::black(clean.height(), clean.width());
     capture.develop(clean, &[drop_ev], &mut [image.samples_mut()]);
     image
 }
 
-/// A sample of a developed image.
-pub(crate) trait Target: Sample + Send {
-    /// Writes the samples of display values after an exposure drop with this [`Developer::factor`].
+/// A sample type of developed images: 8-bit codes or linear light.
+pub(crate) trait OutputSample: Sample + Send {
+    /// Converts display values after an exposure drop with this [`Developer::factor`].
     fn write(developer: &Developer, display: &[f32], factor: f32, samples: &mut [Self]);
 }
 
 /// 8-bit codes.
-impl Target for u8 {
+impl OutputSample for u8 {
     fn write(developer: &Developer, display: &[f32], factor: f32, samples: &mut [Self]) {
         developer.encode(display, factor, samples);
     }
 }
 
 /// Linear light.
-impl Target for f32 {
+impl OutputSample for f32 {
     fn write(developer: &Developer, display: &[f32], factor: f32, samples: &mut [Self]) {
         developer.expand(display, factor, samples);
     }
 }
 
-/// One exposure of the sensor: camera state and noise, ready for any row.
+/// One exposure of the sensor: camera state and noise, prepared for any row.
 pub(crate) struct Capture {
     unprocess: Unprocess,
     noise: Noise,
@@ -214,11 +213,11 @@ impl Capture {
             Draws::Fresh => key.at(severity),
         };
         let Synthesis { amplify, tone, .. } = *synthesis;
-        Self::with(&key, &state, amplify, tone, &Term::ALL, isa)
+        Self::from_state(&key, &state, amplify, tone, &Term::ALL, isa)
     }
 
-    /// The image of a frame after an exposure drop; drop and headroom of the noise profile are in EV.
-    pub(crate) fn image<T: Target>(
+    /// Makes the image of a frame after an exposure drop. Drop and headroom of the noise profile are in EV.
+    pub(crate) fn image<T: OutputSample>(
         self,
         clean: Clean<'_>,
         drop_ev: f64,
@@ -230,7 +229,7 @@ impl Capture {
         image
     }
 
-    pub(crate) fn with(
+    pub(crate) fn from_state(
         key: &NoiseKey,
         state: &CameraState,
         amplify: Amplify,
@@ -245,9 +244,9 @@ impl Capture {
         }
     }
 
-    /// The same exposure, prepared for a clean frame. Codes end at white, and so does the sensor. For linear light the sensor saturates
-    /// `headroom_ev` EV above white, and the tone curve before the drop is left out: it undoes the inverse tone curve of codes, and linear
-    /// light has none.
+    /// Adapts the exposure to the pixel format of a frame. For codes and display light the sensor saturates at white. For linear scene
+    /// light it saturates `headroom_ev` EV above white, and the tone curve before the drop is omitted, because it would only undo the
+    /// inverse tone curve of codes.
     fn for_clean(self, clean: Clean<'_>, headroom_ev: f64) -> Self {
         if !matches!(clean, Clean::Scene(_)) {
             return self;
@@ -267,8 +266,8 @@ impl Capture {
         line.repeat_edges();
     }
 
-    /// Develops the frame after each of these exposure drops, band by band. `images` are the samples of images of its size.
-    fn develop<T: Target>(&self, clean: Clean<'_>, drops: &[f64], images: &mut [&mut [T]]) {
+    /// Develops the frame after each of these exposure drops, band by band. `images[i]` receives the samples of the image for `drops[i]`.
+    fn develop<T: OutputSample>(&self, clean: Clean<'_>, drops: &[f64], images: &mut [&mut [T]]) {
         let (height, width) = (clean.height(), clean.width());
         let factors: Vec<f32> = drops
             .iter()
@@ -283,10 +282,9 @@ impl Capture {
                 band.push(part);
             }
         }
-        // A band has two more rows on each side, except at the image's edges. Two, so that it begins with a row of red sites.
-        let scratch = || (Bayer::covering(BAND + 4, width), vec![0.0; 3 * width]);
+        // A band has two more rows on each side, except at the edges of the image. Two, so that it starts with a row of red sites.
         bands.into_par_iter().enumerate().for_each_init(
-            scratch,
+            || (Bayer::covering(BAND + 4, width), vec![0.0; 3 * width]),
             |(raw, display), (band, mut parts)| {
                 let first = band * BAND;
                 let rows = BAND.min(height - first);
@@ -314,12 +312,12 @@ impl Synthesis {
     /// State of the camera of the frame that `key` belongs to, at a level.
     #[must_use]
     pub fn state(&self, key: &NoiseKey, severity: Severity) -> CameraState {
-        self.state_by(key, severity.value())
+        self.state_after_drop(key, severity.value())
     }
 
-    /// State of the camera after any exposure drop. With [`Coupling::Photon`], a negative drop has the ratio 1.
+    /// State of the camera after any exposure drop. With [`Coupling::Photon`], the ratio is 1 for a negative drop.
     #[must_use]
-    pub fn state_by(&self, key: &NoiseKey, drop_ev: f64) -> CameraState {
+    pub fn state_after_drop(&self, key: &NoiseKey, drop_ev: f64) -> CameraState {
         let drawn = CameraState::draw(key, &self.camera);
         match self.coupling {
             Coupling::Independent => drawn,
@@ -330,13 +328,13 @@ impl Synthesis {
         }
     }
 
-    /// How many EV above white the sensor saturates after an exposure drop ([`Coupling::headroom_ev`]).
+    /// Light at which the sensor saturates after an exposure drop, in EV above white ([`Coupling::headroom_ev`]).
     #[must_use]
     pub fn headroom_ev(&self, drop_ev: f64) -> f64 {
         self.coupling.headroom_ev(drop_ev)
     }
 
-    /// Whether all levels of a frame are developed from one negative.
+    /// True if all levels of a frame are developed from one negative.
     #[must_use]
     pub fn shares_negative(&self) -> bool {
         self.draws == Draws::Shared && self.coupling == Coupling::Independent
@@ -348,7 +346,7 @@ mod tests {
     use super::*;
     use darkqa_ground::types::FrameId;
 
-    /// Dark, bright and medium samples, so that every branch of the samplers is reached.
+    /// Dark, medium and bright samples, so that every branch of the samplers is reached.
     fn clean() -> Rgb {
         let samples = (0..40 * 150 * 3).map(|i: u32| (i.wrapping_mul(2_654_435_761) >> 24) as u8);
         Rgb::new(40, 150, samples.collect()).unwrap()
@@ -373,17 +371,16 @@ mod tests {
                 ..drawn
             };
             for (amplify, tone) in choices {
-                let develop = |isa: &Isa| {
-                    let capture = Capture::with(&key, &state, amplify, tone, &Term::ALL, *isa);
+                let mut baseline = None;
+                for isa in [Isa::Baseline].iter().chain(&sets) {
+                    let capture =
+                        Capture::from_state(&key, &state, amplify, tone, &Term::ALL, *isa);
                     let mut images = Severity::LADDER.map(|_| Rgb::black(40, 150));
                     let drops = Severity::LADDER.map(Severity::value);
                     let mut samples = images.each_mut().map(Rgb::samples_mut);
                     capture.develop((&clean).into(), &drops, &mut samples);
-                    images
-                };
-                let baseline = develop(&Isa::Baseline);
-                for isa in &sets {
-                    assert_eq!(baseline, develop(isa), "{isa:?}, K {gain}, r {ratio}");
+                    let expected = baseline.get_or_insert_with(|| images.clone());
+                    assert_eq!(*expected, images, "{isa:?}, K {gain}, r {ratio}");
                 }
             }
         }

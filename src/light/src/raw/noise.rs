@@ -2,10 +2,9 @@
 //!
 //! The terms work in ADU on the sites of one Bayer plane in one sensor row, and draw from the random bits of those sites.
 //!
-//! In the paper's words, the ratio r belongs to the shot noise alone ("reduce the signal by r, add Poisson noise, amplify
-//! back by r"): read, row and quantisation noise are added to the amplified signal. In ELD all four are added to the
-//! attenuated signal. [`Amplify`] chooses between the two. In the first form the three terms add less than 0.1 codes to an image
-//! (`departures` measures it).
+//! In the paper, the ratio r applies only to the shot noise ("reduce the signal by r, add Poisson noise, amplify back by r"): read, row and
+//! quantisation noise are added to the amplified signal. In ELD, all four terms are added to the attenuated signal. [`Amplify`] selects one
+//! of the two. In the first, the three terms add less than 0.1 codes to an image (measured in `departures`).
 
 use std::sync::Arc;
 
@@ -67,8 +66,8 @@ pub fn read(adu: &mut Lanes<f32>, scale: f32, shape: &Quantile, offset: f32, wor
 
 /// Row noise: one number of N(0, σ_r²) for a whole sensor row, that is, for both of its planes (Wei et al. 2021).
 ///
-/// The paper writes "each row" of a RAW image of H/2 × W/2 × 4 samples. Circuits read out rows of the sensor; one row of the RAW image has
-/// two of them, each with its own number.
+/// The paper states "each row" of a RAW image of H/2 × W/2 × 4 samples. Because circuits read out sensor rows, the two sensor rows in each
+/// such row get separate numbers.
 #[must_use]
 pub fn row(deviation: f64, stream: Stream, row: usize) -> f32 {
     (deviation * stream.at(Site::new(row, 0)).normal()) as f32
@@ -82,11 +81,11 @@ pub fn quantisation(adu: &mut Lanes<f32>, words: &Lanes<u32>) {
     }
 }
 
-/// Noise of one frame, ready for any of its rows.
+/// Noise of one frame, prepared for any row.
 #[derive(Debug)]
 pub(super) struct Noise {
     amplify: Amplify,
-    /// Value of white in ADU, divided by r: the scale of the samples when the shot noise is added.
+    /// White in ADU divided by r: the scale of the samples when the shot noise is added.
     attenuated: f32,
     ratio: f32,
     adu_range: f32,
@@ -110,20 +109,23 @@ impl Noise {
         terms: &[Term],
         isa: Isa,
     ) -> Self {
-        let has = |term| terms.contains(&term);
         Self {
             amplify,
             attenuated: (state.adu_range / state.ratio) as f32,
             ratio: state.ratio as f32,
             adu_range: state.adu_range as f32,
-            shot: has(Term::Shot).then_some(state.system_gain as f32),
-            read: has(Term::Read).then(|| {
-                let shape = Quantile::kept_tukey_lambda(state.read_shape);
+            shot: terms
+                .contains(&Term::Shot)
+                .then_some(state.system_gain as f32),
+            read: terms.contains(&Term::Read).then(|| {
+                let shape = Quantile::cached_tukey_lambda(state.read_shape);
                 (state.read_scale as f32, shape)
             }),
             bias: state.bias.map(|offset| offset as f32),
-            row: has(Term::Row).then(|| (state.row_deviation, key.stream(Component::Row))),
-            quantisation: has(Term::Quantisation),
+            row: terms
+                .contains(&Term::Row)
+                .then(|| (state.row_deviation, key.stream(Component::Row))),
+            quantisation: terms.contains(&Term::Quantisation),
             field: key.stream(Component::RandomField),
             isa,
         }
@@ -213,7 +215,7 @@ mod tests {
         NoiseKey::new(21, &FrameId("noise".to_owned()))
     }
 
-    /// A grey RAW image with the given terms of noise, row by row.
+    /// A grey RAW image with the given noise terms, row by row.
     fn noisy(state: &CameraState, amplify: Amplify, terms: &[Term]) -> Vec<Vec<f32>> {
         let mut raw = Bayer::covering(8, 12);
         raw.lines_mut().for_each(|mut line| {
@@ -257,25 +259,23 @@ mod tests {
     #[test]
     fn leaving_out_a_term_does_not_change_the_others() {
         for amplify in [Amplify::ShotOnly, Amplify::All] {
-            let noisy = |terms: &[Term]| noisy(&median(), amplify, terms).concat();
-            let difference = |with: &[f32], without: &[f32]| -> Vec<f32> {
-                with.iter().zip(without).map(|(a, b)| a - b).collect()
-            };
             for term in Term::ALL {
                 let others: Vec<Term> = Term::ALL
                     .into_iter()
                     .filter(|other| *other != term)
                     .collect();
-                let with_others = difference(&noisy(&Term::ALL), &noisy(&others));
-                let alone = difference(&noisy(&[term]), &noisy(&[]));
-                for (a, b) in with_others.iter().zip(&alone) {
-                    assert!((a - b).abs() < 1e-6, "{term:?}");
+                let [all, others, alone, none] = [&Term::ALL[..], &others, &[term], &[]]
+                    .map(|terms| noisy(&median(), amplify, terms).concat());
+                for i in 0..all.len() {
+                    let off = (all[i] - others[i]) - (alone[i] - none[i]);
+                    assert!(off.abs() < 1e-6, "{term:?}");
                 }
             }
         }
     }
 
-    /// With `all`, the terms after the shot noise are r times larger than with `shot-only`; the shot noise is the same.
+    /// With [`Amplify::All`], the terms after the shot noise are r times larger than with [`Amplify::ShotOnly`]; the shot noise is the
+    /// same.
     #[test]
     fn the_ratio_amplifies_the_chosen_terms() {
         let state = median();

@@ -11,16 +11,16 @@ use crate::curve;
 use crate::draws::{LANES, Lanes, Piecewise};
 use darkqa_ground::types::images::{Isa, Kernel};
 
-/// The noise-free RAW image from which a camera in this state would make `clean`.
+/// Makes the noise-free RAW image from which a camera in this state would make `clean`.
 ///
 /// An odd height or width is made even by repeating the last row or column.
 #[must_use]
 pub fn unprocess<'a>(clean: impl Into<Clean<'a>>, state: &CameraState) -> Bayer {
-    unprocess_up_to(clean, state, 0.0)
+    unprocess_with_headroom(clean, state, 0.0)
 }
 
-/// The same for a sensor that saturates this many EV above white, which matters for light alone.
-pub fn unprocess_up_to<'a>(
+/// [`unprocess`] for a sensor that saturates this many EV above white; the headroom only affects linear scene light.
+pub fn unprocess_with_headroom<'a>(
     clean: impl Into<Clean<'a>>,
     state: &CameraState,
     headroom_ev: f64,
@@ -36,15 +36,15 @@ pub fn unprocess_up_to<'a>(
     raw
 }
 
-/// The way from the samples of a clean image to those of the sensor.
-trait Undoing {
-    /// A sample of the clean image.
+/// Conversion of the samples of one pixel format to linear scene light and sensor samples.
+trait ToSceneLight {
+    /// Sample type of the clean image.
     type Sample: Copy;
 
-    /// The light in front of the camera: the inverse tone curve, and then gamma expansion.
+    /// Light in front of the camera: inverse tone curve, then gamma expansion.
     fn light(&self, sample: Self::Sample) -> f32;
 
-    /// The samples of one plane for these colours.
+    /// Sensor samples of one plane for these colours.
     #[inline(always)]
     fn samples(&self, filter: &Filter, light: &[Lanes<f32>; 3]) -> Lanes<f32> {
         filter.samples(light)
@@ -59,7 +59,7 @@ static LINEAR_LIGHT: LazyLock<[f32; 256]> = LazyLock::new(|| {
 });
 
 /// Codes of 8 bits.
-impl Undoing for &[f32; 256] {
+impl ToSceneLight for &[f32; 256] {
     type Sample = u8;
 
     #[inline(always)]
@@ -70,8 +70,7 @@ impl Undoing for &[f32; 256] {
 
 /// Light of each 16-bit code in front of the camera.
 static LINEAR_LIGHT_16: LazyLock<Box<[f32; 65_536]>> = LazyLock::new(|| {
-    let codes = 0..=u16::MAX;
-    let light: Vec<f32> = codes
+    let light: Vec<f32> = (0..=u16::MAX)
         .map(|code| {
             curve::gamma_expand(curve::inverse_smoothstep(f64::from(code) / 65_535.0)) as f32
         })
@@ -82,7 +81,7 @@ static LINEAR_LIGHT_16: LazyLock<Box<[f32; 65_536]>> = LazyLock::new(|| {
 });
 
 /// Codes of 16 bits.
-impl Undoing for &[f32; 65_536] {
+impl ToSceneLight for &[f32; 65_536] {
     type Sample = u16;
 
     #[inline(always)]
@@ -91,12 +90,12 @@ impl Undoing for &[f32; 65_536] {
     }
 }
 
-/// Light in front of the camera, for a sensor that saturates at `headroom`.
-struct Scene {
+/// Linear scene light, for a sensor that saturates at `headroom`.
+struct LinearScene {
     headroom: f32,
 }
 
-impl Undoing for Scene {
+impl ToSceneLight for LinearScene {
     type Sample = f32;
 
     #[inline(always)]
@@ -104,50 +103,57 @@ impl Undoing for Scene {
         light
     }
 
-    /// Highlights are not preserved, because the light of white is that of any other.
+    /// Highlights are not preserved, because white is not special in scene light.
     #[inline(always)]
     fn samples(&self, filter: &Filter, light: &[Lanes<f32>; 3]) -> Lanes<f32> {
         filter.plain_samples(light, self.headroom)
     }
 }
 
-/// Light of each displayed light in front of the camera.
-static UNTONED: LazyLock<Untoned> = LazyLock::new(Untoned::new);
+/// Light in front of the camera for display light.
+static INVERSE_TONE: LazyLock<InverseToneTable> = LazyLock::new(InverseToneTable::new);
 
-/// Smallest light, and smallest distance from white, that is distinguished from black or white: 2⁻³¹.
-const LEAST: f32 = 1.0 / 2_147_483_648.0;
+/// Smallest light, and smallest distance from white, in the tables: 2⁻³¹. Smaller values count as black or white.
+const MIN_LIGHT: f32 = 1.0 / 2_147_483_648.0;
 
-/// The light in front of the camera as a function of displayed light: that of the codes, for any light in [0, 1].
+/// Tables from display light in [0, 1] to light in front of the camera, with the same curve as for codes.
 #[derive(Debug)]
-struct Untoned {
-    /// By light below ½.
+struct InverseToneTable {
+    /// Table by light, for light below ½.
     dark: Piecewise,
-    /// By the distance from white, where the inverse tone curve is as steep as a square root at 0.
+    /// Table by the distance from white, where the inverse tone curve is as steep as a square root at 0.
     bright: Piecewise,
 }
 
-impl Untoned {
+impl InverseToneTable {
     fn new() -> Self {
-        // Without the floor of `gamma_compress`, which would make all light below it equal.
-        let of = |light: f64| {
-            let display = libm::pow(light.max(0.0), 1.0 / curve::GAMMA);
-            curve::gamma_expand(curve::inverse_smoothstep(display))
-        };
-        let above_least = |x: f64| if x > f64::from(LEAST) { x } else { 0.0 };
         Self {
-            dark: Piecewise::new(-31, |light| of(above_least(light))),
-            bright: Piecewise::new(-31, |distance| of(1.0 - above_least(distance))),
+            dark: Piecewise::new(-31, |light| scene_light(zero_if_negligible(light))),
+            bright: Piecewise::new(-31, |distance| {
+                scene_light(1.0 - zero_if_negligible(distance))
+            }),
         }
     }
 }
 
-/// Displayed light; light above 1 counts as 1.
-impl Undoing for &Untoned {
+/// Light in front of the camera for display light.
+fn scene_light(display_light: f64) -> f64 {
+    // Not `gamma_compress`, whose floor would make all darker light equal.
+    let display = libm::pow(display_light.max(0.0), 1.0 / curve::GAMMA);
+    curve::gamma_expand(curve::inverse_smoothstep(display))
+}
+
+fn zero_if_negligible(x: f64) -> f64 {
+    if x > f64::from(MIN_LIGHT) { x } else { 0.0 }
+}
+
+/// Display light; light above 1 counts as 1.
+impl ToSceneLight for &InverseToneTable {
     type Sample = f32;
 
     #[inline(always)]
     fn light(&self, light: f32) -> f32 {
-        let at_least = |x: f32| if x > LEAST { x } else { LEAST };
+        let at_least = |x: f32| if x > MIN_LIGHT { x } else { MIN_LIGHT };
         if light < 0.5 {
             self.dark.at(at_least(light))
         } else {
@@ -156,11 +162,11 @@ impl Undoing for &Untoned {
     }
 }
 
-/// Conversion of pixels to RAW for one camera, ready for any row.
+/// Conversion of pixels to RAW for one camera, prepared for any row.
 #[derive(Debug)]
 pub(super) struct Unprocess {
     filters: [Filter; 4],
-    /// Light in front of the camera at which the sensor saturates; 1 is white. Codes have no light above white.
+    /// Scene light at which the sensor saturates; 1 is white. Codes have no light above white.
     headroom: f32,
     isa: Isa,
 }
@@ -199,7 +205,7 @@ impl Unprocess {
         }
     }
 
-    /// The same for a sensor that saturates at this light; 1 is white.
+    /// Sets the scene light at which the sensor saturates; 1 is white.
     pub(super) fn with_headroom(self, headroom: f32) -> Self {
         Self { headroom, ..self }
     }
@@ -217,10 +223,10 @@ impl Unprocess {
                 self.fill_from(curve, &codes.samples()[samples], row, line);
             }
             Clean::Light(light) => {
-                self.fill_from(&*UNTONED, &light.samples()[samples], row, line);
+                self.fill_from(&*INVERSE_TONE, &light.samples()[samples], row, line);
             }
             Clean::Scene(light) => {
-                let scene = Scene {
+                let scene = LinearScene {
                     headroom: self.headroom,
                 };
                 self.fill_from(scene, &light.samples()[samples], row, line);
@@ -230,9 +236,9 @@ impl Unprocess {
 
     /// Fills a sensor row from the samples of a row of pixels.
     #[expect(clippy::needless_pass_by_value, reason = "a reference or one number")]
-    fn fill_from<U: Undoing>(
+    fn fill_from<U: ToSceneLight>(
         &self,
-        undoing: U,
+        to_light: U,
         row_of_pixels: &[U::Sample],
         row: usize,
         line: &mut RawRow<'_>,
@@ -240,7 +246,7 @@ impl Unprocess {
         let pixels = row_of_pixels.as_chunks::<3>().0;
         for (parity, samples) in line.planes().into_iter().enumerate() {
             self.isa.run(PlaneRow {
-                undoing: &undoing,
+                to_light: &to_light,
                 filter: self.filters[Plane::at(row, parity) as usize],
                 pixels,
                 parity,
@@ -251,18 +257,18 @@ impl Unprocess {
 }
 
 /// Sites of one plane in one row, with the pixels of that row.
-struct PlaneRow<'a, U: Undoing> {
-    undoing: &'a U,
+struct PlaneRow<'a, U: ToSceneLight> {
+    to_light: &'a U,
     filter: Filter,
     pixels: &'a [[U::Sample; 3]],
     parity: usize,
     samples: &'a mut [Lanes<f32>],
 }
 
-impl<U: Undoing> Kernel for PlaneRow<'_, U> {
+impl<U: ToSceneLight> Kernel for PlaneRow<'_, U> {
     #[inline(always)]
     fn run(self) {
-        let undoing = self.undoing;
+        let to_light = self.to_light;
         for (index, samples) in self.samples.iter_mut().enumerate() {
             let mut light = [[0.0; LANES]; 3];
             let first = (2 * LANES * index).min(self.pixels.len() - 1);
@@ -271,18 +277,18 @@ impl<U: Undoing> Kernel for PlaneRow<'_, U> {
                 // The usual case: all pixels are inside the image, so the edge is not checked for each of them.
                 for (lane, pair) in pixels.as_chunks::<2>().0[..LANES].iter().enumerate() {
                     for channel in 0..3 {
-                        light[channel][lane] = undoing.light(pair[self.parity][channel]);
+                        light[channel][lane] = to_light.light(pair[self.parity][channel]);
                     }
                 }
             } else {
                 for lane in 0..LANES {
                     let pixel = pixels[(2 * lane + self.parity).min(pixels.len() - 1)];
                     for channel in 0..3 {
-                        light[channel][lane] = undoing.light(pixel[channel]);
+                        light[channel][lane] = to_light.light(pixel[channel]);
                     }
                 }
             }
-            *samples = undoing.samples(&self.filter, &light);
+            *samples = to_light.samples(&self.filter, &light);
         }
     }
 }
@@ -313,7 +319,7 @@ impl Filter {
         samples
     }
 
-    /// The same by the inverse gain alone, for light that may be brighter than white; clipped to [0, `headroom`].
+    /// [`Self::samples`] without preserved highlights, for light that may be brighter than white; clipped to [0, `headroom`].
     #[inline(always)]
     fn plain_samples(&self, [red, green, blue]: &[Lanes<f32>; 3], headroom: f32) -> Lanes<f32> {
         let mut samples = [0.0; LANES];
@@ -370,9 +376,12 @@ mod tests {
     fn the_last_row_and_column_of_an_odd_image_are_repeated() {
         let samples: Vec<u8> = (0..27).map(|i| i * 9).collect();
         let odd = Rgb::new(3, 3, samples.clone()).unwrap();
-        let pixel =
-            |row: usize, column: usize| &samples[(row.min(2) * 3 + column.min(2)) * 3..][..3];
-        let padded = (0..16).flat_map(|i| pixel(i / 4, i % 4).to_vec()).collect();
+        let padded = (0..16)
+            .flat_map(|i: usize| {
+                let (row, column) = ((i / 4).min(2), (i % 4).min(2));
+                samples[(row * 3 + column) * 3..][..3].to_vec()
+            })
+            .collect();
         let even = Rgb::new(4, 4, padded).unwrap();
         assert_eq!(unprocess(&odd, &median()), unprocess(&even, &median()));
     }
@@ -389,8 +398,8 @@ mod tests {
         .unwrap()
     }
 
-    /// The light that a display shows for a code, plus a number of codes.
-    fn shown(code: u8, more: f64) -> f32 {
+    /// Display light of a code plus `more` codes.
+    fn display_light(code: u8, more: f64) -> f32 {
         libm::pow(((f64::from(code) + more) / 255.0).clamp(0.0, 1.0), 2.2) as f32
     }
 
@@ -398,12 +407,12 @@ mod tests {
         let samples = image
             .samples()
             .iter()
-            .map(|code| shown(*code, more))
+            .map(|code| display_light(*code, more))
             .collect();
         Light::new(image.height(), image.width(), samples).unwrap()
     }
 
-    fn greatest_difference(one: &Bayer, other: &Bayer) -> f32 {
+    fn max_difference(one: &Bayer, other: &Bayer) -> f32 {
         (0..one.height())
             .flat_map(|row| (0..one.width()).map(move |at| (row, at)))
             .map(|(row, at)| (one.sample(row, at) - other.sample(row, at)).abs())
@@ -411,32 +420,32 @@ mod tests {
     }
 
     #[test]
-    fn light_of_codes_gives_the_raw_of_the_codes() {
+    fn light_of_codes_gives_the_same_raw_image() {
         let (codes, state) = (codes(), median());
         let raw = unprocess(&codes, &state);
         let exact = light(&codes, 0.0);
-        assert!(greatest_difference(&raw, &unprocess(&exact, &state)) < 2e-6);
-        // The control: a twentieth of a code shows.
+        assert!(max_difference(&raw, &unprocess(&exact, &state)) < 2e-6);
+        // A difference of a twentieth of a code is detected.
         let other = light(&codes, 0.05);
-        assert!(greatest_difference(&raw, &unprocess(&other, &state)) > 1e-4);
+        assert!(max_difference(&raw, &unprocess(&other, &state)) > 1e-4);
     }
 
     #[test]
     fn light_follows_the_formula_between_the_codes_and_at_both_ends() {
-        let curve = &*UNTONED;
+        let table = &*INVERSE_TONE;
         for (ends, expected) in [(0.0, LINEAR_LIGHT[0]), (1.0, 1.0), (1.5, 1.0), (1e-12, 0.0)] {
-            assert!((curve.light(ends) - expected).abs() < 1e-9, "{ends}");
+            assert!((table.light(ends) - expected).abs() < 1e-9, "{ends}");
         }
         let mut last = 0.0;
         for step in 0..=200_000 {
             let at = (f64::from(step) / 200_000.0).powi(3) as f32;
             let display = libm::pow(f64::from(at), 1.0 / curve::GAMMA);
             let expected = curve::gamma_expand(curve::inverse_smoothstep(display));
-            let found = curve.light(at);
+            let found = table.light(at);
             let off = (f64::from(found) - expected).abs();
             // Light below the smallest one is black.
             assert!(
-                at <= 2.0 * LEAST || off < 1e-7 + 4e-6 * expected,
+                at <= 2.0 * MIN_LIGHT || off < 1e-7 + 4e-6 * expected,
                 "{at}: {off}"
             );
             assert!(found >= last, "{at}");

@@ -1,38 +1,42 @@
-//! Curves from the values of a channel to linear light: [`ToneCurve`].
+//! Tone curves from channel values to linear light: [`ToneCurve`].
 
 use moxcms::ToneReprCurve;
 
 use super::srgb;
 
-/// A curve from values in [0, 1] to linear light in [0, 1].
+/// A tone curve from values in [0, 1] to linear light in [0, 1].
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum ToneCurve {
     /// The curve of sRGB.
     Srgb,
     /// The curve of BT.709.
     Bt709,
-    /// A power.
+    /// A power function with this exponent.
     Gamma(f64),
-    /// Light at equal distances, interpolated; at least two values.
+    /// At least two equally spaced values of light, interpolated linearly.
     Table(Vec<f64>),
     /// The segmented curve of ICC.1:2022, section 10.18, with its parameters g, a, b, c, d, e and f.
     Segments([f64; 7]),
 }
 
 impl ToneCurve {
-    /// The curve of a profile.
+    /// Converts a curve of an ICC profile.
     ///
     /// # Errors
-    /// If a number of it is not finite.
+    /// If a number is not finite, or the number of parameters is unknown.
     pub(super) fn from_profile(curve: &ToneReprCurve) -> Result<Self, String> {
         let numbers = match curve {
             ToneReprCurve::Lut(table) => match table[..] {
                 [] => return Ok(Self::Gamma(1.0)),
-                // An unsigned number of 8 bits before the point and 8 behind it.
+                // An unsigned fixed-point number with 8 integer and 8 fractional bits.
                 [gamma] => return Ok(Self::Gamma(f64::from(gamma) / 256.0)),
                 _ => {
-                    let values = table.iter().map(|value| f64::from(*value) / 65_535.0);
-                    return Ok(Self::Table(values.collect()));
+                    return Ok(Self::Table(
+                        table
+                            .iter()
+                            .map(|value| f64::from(*value) / 65_535.0)
+                            .collect(),
+                    ));
                 }
             },
             ToneReprCurve::Parametric(numbers) => numbers,
@@ -57,7 +61,7 @@ impl ToneCurve {
             Self::Srgb => srgb::light(value),
             Self::Bt709 => bt709(value),
             Self::Gamma(gamma) => libm::pow(value, *gamma),
-            Self::Table(values) => interpolated(values, value),
+            Self::Table(values) => interpolate(values, value),
             Self::Segments([g, a, b, c, d, e, f]) => {
                 if value >= *d {
                     libm::pow((a * value + b).max(0.0), *g) + e
@@ -66,12 +70,12 @@ impl ToneCurve {
                 }
             }
         };
-        // Also a number that is none, as of 0 to a negative power, becomes 0.
+        // NaN becomes 0, too.
         if light > 0.0 { light.min(1.0) } else { 0.0 }
     }
 }
 
-/// Linear light of a value by BT.709-6, item 1.2, whose curve is inverted.
+/// Linear light of a value by the inverse of the curve of BT.709-6, item 1.2.
 fn bt709(value: f64) -> f64 {
     const ALPHA: f64 = 1.099_296_826_809_44;
     const BETA: f64 = 0.018_053_968_510_807;
@@ -82,23 +86,28 @@ fn bt709(value: f64) -> f64 {
     }
 }
 
-/// The value at a place in [0, 1] among at least two values at equal distances.
-pub(super) fn interpolated(values: &[f64], at: f64) -> f64 {
-    let place = at * (values.len() - 1) as f64;
-    let low = (place as usize).min(values.len() - 2);
-    let share = place - low as f64;
-    values[low] + share * (values[low + 1] - values[low])
+/// Interpolates linearly between at least two equally spaced values, at a position in [0, 1].
+pub(super) fn interpolate(values: &[f64], at: f64) -> f64 {
+    let position = at * (values.len() - 1) as f64;
+    let low = (position as usize).min(values.len() - 2);
+    let fraction = position - low as f64;
+    values[low] + fraction * (values[low + 1] - values[low])
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn segments(numbers: &[f32]) -> ToneReprCurve {
+        ToneReprCurve::Parametric(numbers.to_vec())
+    }
+
+    fn table(numbers: &[u16]) -> ToneReprCurve {
+        ToneReprCurve::Lut(numbers.to_vec())
+    }
+
     #[test]
     fn curves_of_profiles_follow_the_specification() {
-        let of = |curve: ToneReprCurve, at: f64| ToneCurve::from_profile(&curve).unwrap().light(at);
-        let segments = |numbers: &[f32]| ToneReprCurve::Parametric(numbers.to_vec());
-        let table = |numbers: &[u16]| ToneReprCurve::Lut(numbers.to_vec());
         let srgb = [2.4, 1.0 / 1.055, 0.055 / 1.055, 1.0 / 12.92, 0.04045];
         for (curve, at, expected) in [
             (table(&[]), 0.3, 0.3),
@@ -116,21 +125,22 @@ mod tests {
             (segments(&[2.0, 1.0, 0.0, 0.5, 0.4, 0.01, 0.02]), 0.2, 0.12),
             (segments(&[2.0, 1.0, 0.0, 0.5, 0.4, 0.01, 0.02]), 0.5, 0.26),
         ] {
-            let found = of(curve.clone(), at);
+            let found = ToneCurve::from_profile(&curve).unwrap().light(at);
             assert!(
                 (found - expected).abs() < 1e-7,
                 "{curve:?} at {at}: {found}"
             );
         }
-        let is_one = |found: f64| (found - 1.0).abs() < f64::EPSILON;
-        assert!(is_one(of(segments(&[-1.0]), 0.0)));
-        assert!(is_one(of(segments(&[2.0, 9.0, 0.0]), 1.0)));
+        for (curve, at) in [(segments(&[-1.0]), 0.0), (segments(&[2.0, 9.0, 0.0]), 1.0)] {
+            let clipped = ToneCurve::from_profile(&curve).unwrap().light(at);
+            assert!((clipped - 1.0).abs() < f64::EPSILON);
+        }
         assert!(ToneCurve::from_profile(&segments(&[f32::NAN])).is_err());
         assert!(ToneCurve::from_profile(&segments(&[1.0, 1.0])).is_err());
     }
 
     #[test]
-    fn the_curve_of_video_is_continuous() {
+    fn the_bt709_curve_is_continuous() {
         let join = 4.5 * 0.018_053_968_510_807;
         let step = bt709(join + 1e-9) - bt709(join - 1e-9);
         assert!(step.abs() < 1e-8, "{step}");

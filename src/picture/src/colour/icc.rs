@@ -1,4 +1,4 @@
-//! ICC profiles: [`Profile`] of curves and a matrix, [`InkProfile`] of four inks.
+//! ICC profiles: matrix profiles for RGB and grey ([`Profile`]), and CMYK profiles ([`InkProfile`]).
 
 use moxcms::{ColorProfile, DataColorSpace, ProfileText, ToneReprCurve};
 
@@ -6,15 +6,15 @@ use super::conversion::Conversion;
 use super::curve::ToneCurve;
 use super::primaries::{IDENTITY, xyz_to_srgb};
 
-/// Most letters of a profile's name in messages; chosen.
-const LONGEST: usize = 60;
+/// Maximum number of characters of a profile's name in messages; chosen.
+const MAX_NAME: usize = 60;
 
-/// A profile of curves and a matrix, or of one curve for grey.
+/// A profile of tone curves and a matrix, or of one curve for grey.
 pub(super) struct Profile {
-    /// The description of the profile.
+    /// Description text of the profile.
     pub(super) name: String,
     pub(super) conversion: Conversion,
-    /// Whether it is a profile of grey.
+    /// True for a grey profile.
     pub(super) is_grey: bool,
 }
 
@@ -22,10 +22,10 @@ impl Profile {
     /// Reads a profile (ICC.1:2022).
     ///
     /// # Errors
-    /// If it is broken, or not of curves and a matrix. The error names it.
+    /// If it is broken, or not a matrix or grey profile.
     pub(super) fn read(bytes: &[u8]) -> Result<Self, String> {
         let header = Header::read(bytes)?;
-        // A library would read the tables of printers, too, which may be large and are not needed.
+        // The header is checked first, because the library would also parse printer tables, which may be large.
         match &header.space {
             b"RGB " | b"GRAY" => {}
             b"CMYK" => return Err("the ICC profile is for CMYK".to_owned()),
@@ -45,22 +45,17 @@ impl Profile {
         if &header.connection != b"XYZ " {
             return Err("the connection space of the ICC profile is not XYZ".to_owned());
         }
-        let profile = parsed(bytes)?;
-        let name = name(&profile);
-        let lacks = |what: &str| format!("the ICC profile {name:?} has no {what}");
-        let curve = |curve: &Option<ToneReprCurve>| {
-            let curve = curve.as_ref().ok_or_else(|| lacks("curve"))?;
-            ToneCurve::from_profile(curve)
-        };
+        let profile = parse(bytes)?;
+        let name = profile_name(&profile);
         let is_grey = profile.color_space == DataColorSpace::Gray;
         let (curves, matrix) = if is_grey {
-            let grey = curve(&profile.gray_trc)?;
+            let grey = tone_curve(&name, profile.gray_trc.as_ref())?;
             ([grey.clone(), grey.clone(), grey], IDENTITY)
         } else {
             let curves = [
-                curve(&profile.red_trc)?,
-                curve(&profile.green_trc)?,
-                curve(&profile.blue_trc)?,
+                tone_curve(&name, profile.red_trc.as_ref())?,
+                tone_curve(&name, profile.green_trc.as_ref())?,
+                tone_curve(&name, profile.blue_trc.as_ref())?,
             ];
             let [r, g, b] = [
                 profile.red_colorant,
@@ -72,7 +67,7 @@ impl Profile {
         };
         let numbers = matrix.as_flattened();
         if numbers.iter().any(|number| !number.is_finite()) || numbers.iter().all(|n| *n == 0.0) {
-            return Err(lacks("matrix"));
+            return Err(missing(&name, "matrix"));
         }
         Ok(Self {
             name,
@@ -84,7 +79,7 @@ impl Profile {
 
 /// A profile of cyan, magenta, yellow and black.
 pub(super) struct InkProfile {
-    /// The description of the profile.
+    /// Description text of the profile.
     pub(super) name: String,
     pub(super) profile: ColorProfile,
 }
@@ -93,31 +88,42 @@ impl InkProfile {
     /// Reads a profile (ICC.1:2022).
     ///
     /// # Errors
-    /// If it is broken, or not of these inks.
+    /// If it is broken, or not a CMYK profile.
     pub(super) fn read(bytes: &[u8]) -> Result<Self, String> {
         let header = Header::read(bytes)?;
         if &header.space != b"CMYK" {
             return Err("the image is CMYK, but its ICC profile is not for CMYK".to_owned());
         }
-        let profile = parsed(bytes)?;
+        let profile = parse(bytes)?;
         Ok(Self {
-            name: name(&profile),
+            name: profile_name(&profile),
             profile,
         })
     }
 }
 
-/// All parts of a profile.
-fn parsed(bytes: &[u8]) -> Result<ColorProfile, String> {
+/// The error for a profile without a required part.
+fn missing(name: &str, part: &str) -> String {
+    format!("the ICC profile {name:?} has no {part}")
+}
+
+/// Converts a tone curve of the profile `name`, which must have it.
+fn tone_curve(name: &str, curve: Option<&ToneReprCurve>) -> Result<ToneCurve, String> {
+    ToneCurve::from_profile(curve.ok_or_else(|| missing(name, "curve"))?)
+}
+
+fn parse(bytes: &[u8]) -> Result<ColorProfile, String> {
     ColorProfile::new_from_slice(bytes)
         .map_err(|e| format!("the ICC profile is broken: {}", readable(&e.to_string())))
 }
 
-/// The fields at the head of a profile that decide whether it can be used.
+/// Fields of a profile that decide if it is supported.
 struct Header {
+    /// Signature of the colour space of the codes.
     space: [u8; 4],
+    /// Signature of the profile connection space.
     connection: [u8; 4],
-    /// Whether it has tables from codes to the connection space.
+    /// True if the profile has tables from codes to the connection space.
     has_tables: bool,
 }
 
@@ -127,11 +133,10 @@ impl Header {
     }
 
     fn fields(bytes: &[u8]) -> Option<Self> {
-        let four = |at: usize| bytes.get(at..)?.first_chunk::<4>().copied();
-        let tags = u32::from_be_bytes(four(128)?) as usize;
-        // Each tag takes 12 bytes of the profile.
+        let tags = u32::from_be_bytes(four_bytes(bytes, 128)?) as usize;
+        // Each entry of the tag table has 12 bytes.
         let has_tables = (0..tags.min(bytes.len() / 12))
-            .map_while(|tag| four(132 + 12 * tag))
+            .map_while(|tag| four_bytes(bytes, 132 + 12 * tag))
             .into_iter()
             .any(|tag| {
                 [
@@ -140,15 +145,19 @@ impl Header {
                 .contains(&&tag)
             });
         Some(Self {
-            space: four(16)?,
-            connection: four(20)?,
+            space: four_bytes(bytes, 16)?,
+            connection: four_bytes(bytes, 20)?,
             has_tables,
         })
     }
 }
 
-/// The description of a profile.
-fn name(profile: &ColorProfile) -> String {
+fn four_bytes(bytes: &[u8], at: usize) -> Option<[u8; 4]> {
+    bytes.get(at..)?.first_chunk::<4>().copied()
+}
+
+/// The description text of a profile.
+fn profile_name(profile: &ColorProfile) -> String {
     let text = match &profile.description {
         None => "",
         Some(ProfileText::PlainString(text)) => text,
@@ -164,12 +173,12 @@ fn name(profile: &ColorProfile) -> String {
     }
 }
 
-/// The printable characters of a text, cut to [`LONGEST`] letters.
+/// The printable characters of a text, cut to [`MAX_NAME`] characters.
 fn readable(text: &str) -> String {
     let text: String = text
         .chars()
-        .filter(|letter| !letter.is_control())
-        .take(LONGEST)
+        .filter(|character| !character.is_control())
+        .take(MAX_NAME)
         .collect();
     text.trim().to_owned()
 }

@@ -6,7 +6,7 @@ use std::sync::{Arc, LazyLock};
 
 use self::table::InkTable;
 use super::icc::InkProfile;
-use super::{CACHED, ColourTag, MOST_PROFILE, REMEDY, too_large};
+use super::{CACHED_PROFILES, ColourTag, MAX_PROFILE_BYTES, REMEDY, profile_too_large};
 use crate::reading_rule::ColourRule;
 use darkqa_ground::types::values::Recent;
 use darkqa_ground::types::{ColourHandling, ColourNote, Digest};
@@ -104,12 +104,12 @@ fn srgb_by_formula([cyan, magenta, yellow, black]: [u8; 4]) -> [u8; 3] {
     })
 }
 
-/// Reads a profile. The most recent [`CACHED`] profiles are cached by their digests.
+/// Reads a profile. The most recent [`CACHED_PROFILES`] profiles are cached by their digests.
 fn cached_profile(profile: &[u8]) -> Result<Arc<CmykProfile>, String> {
     static CACHE: LazyLock<Recent<Digest, Arc<CmykProfile>>> =
-        LazyLock::new(|| Recent::new(CACHED));
-    if profile.len() > MOST_PROFILE {
-        return Err(too_large());
+        LazyLock::new(|| Recent::new(CACHED_PROFILES));
+    if profile.len() > MAX_PROFILE_BYTES {
+        return Err(profile_too_large());
     }
     let digest = Digest::from_bytes(profile);
     CACHE.get(&digest, || {
@@ -126,14 +126,14 @@ fn cached_profile(profile: &[u8]) -> Result<Arc<CmykProfile>, String> {
 /// Reads the name and the table of a profile.
 fn name_and_table(profile: &[u8]) -> Result<(String, InkTable), String> {
     let InkProfile { name, profile } = InkProfile::read(profile)?;
-    // Both tables map white paper to white. Most printer profiles have the colorimetric one.
-    let lut = profile
+    // Both tables map the white of the paper to white. Most printer profiles have the colorimetric one.
+    profile
         .lut_a_to_b_colorimetric
-        .or(profile.lut_a_to_b_perceptual);
-    let unusable = |reason: &str| format!("the ICC profile {name:?} cannot be used: {reason}");
-    let lut = lut.ok_or_else(|| unusable("it has no table of colours (A2B)"))?;
-    let table = InkTable::new(&lut, profile.pcs).map_err(|reason| unusable(&reason))?;
-    Ok((name, table))
+        .or(profile.lut_a_to_b_perceptual)
+        .ok_or_else(|| "it has no table of colours (A2B)".to_owned())
+        .and_then(|lut| InkTable::new(&lut, profile.pcs))
+        .map_err(|reason| format!("the ICC profile {name:?} cannot be used: {reason}"))
+        .map(|table| (name, table))
 }
 
 #[cfg(test)]

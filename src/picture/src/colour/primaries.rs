@@ -1,22 +1,22 @@
-//! Primaries and white points of RGB colours: [`Primaries`]; and matrices of three rows: [`Matrix`].
+//! Primaries and white points of RGB colour spaces ([`Primaries`]), and 3 × 3 matrices ([`Matrix`]).
 
-/// A matrix of three rows.
+/// A 3 × 3 matrix, row by row.
 pub(crate) type Matrix = [[f64; 3]; 3];
 
-/// The matrix that changes nothing.
+/// The identity matrix.
 pub(super) const IDENTITY: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
-/// The white of profiles, D50 (ICC.1:2022, section 7.2.16).
+/// XYZ of D50, the white of ICC profiles (ICC.1:2022, section 7.2.16).
 pub(super) const D50: [f64; 3] = [0.9642, 1.0, 0.8249];
 
-/// The cone responses by which whites are adapted (Lam 1985, "Bradford").
+/// Matrix of the Bradford chromatic adaptation, from XYZ to cone responses (Lam 1985).
 const BRADFORD: Matrix = [
     [0.8951, 0.2664, -0.1614],
     [-0.7502, 1.7135, 0.0367],
     [0.0389, -0.0685, 1.0296],
 ];
 
-/// x and y of the primaries and of white (CIE 1931).
+/// CIE 1931 x and y of the primaries and of white.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Primaries {
     pub red: [f64; 2],
@@ -26,6 +26,11 @@ pub(crate) struct Primaries {
 }
 
 impl Primaries {
+    /// The points of red, green, blue and white.
+    pub(crate) fn points(&self) -> [[f64; 2]; 4] {
+        [self.red, self.green, self.blue, self.white]
+    }
+
     /// Primaries of sRGB and BT.709 (IEC 61966-2-1).
     pub(crate) const SRGB: Self = Self {
         red: [0.64, 0.33],
@@ -42,11 +47,10 @@ impl Primaries {
         white: [0.3127, 0.3290],
     };
 
-    /// The matrix from linear light with these primaries to XYZ, with white at D50.
+    /// The matrix from linear light with these primaries to XYZ, with white adapted to D50.
     fn to_xyz(self) -> Matrix {
-        let xyz = |[x, y]: [f64; 2]| [x / y, 1.0, (1.0 - x - y) / y];
-        let columns = transposed([xyz(self.red), xyz(self.green), xyz(self.blue)]);
-        let white = xyz(self.white);
+        let columns = transpose([self.red, self.green, self.blue].map(xyz_from_xy));
+        let white = xyz_from_xy(self.white);
         let amounts = times(inverse(columns), white);
         let scaled = columns.map(|row| [0, 1, 2].map(|i| row[i] * amounts[i]));
         let (from, to) = (times(BRADFORD, white), times(BRADFORD, D50));
@@ -54,7 +58,7 @@ impl Primaries {
         product(product(inverse(BRADFORD), scale), scaled)
     }
 
-    /// The matrix from linear light with these primaries to that with the primaries of sRGB. White stays white.
+    /// The matrix from linear light with these primaries to linear light with the primaries of sRGB. White stays white.
     pub(crate) fn to_srgb(self) -> Matrix {
         if self == Self::SRGB {
             return IDENTITY;
@@ -63,41 +67,50 @@ impl Primaries {
     }
 }
 
-/// The matrix from RGB to sRGB, both linear, from that to XYZ with white at D50.
+/// The matrix from a linear RGB space to linear sRGB. `to_xyz` is the matrix from that space to XYZ with white at D50.
 pub(super) fn xyz_to_srgb(to_xyz: Matrix) -> Matrix {
     product(inverse(Primaries::SRGB.to_xyz()), to_xyz)
 }
 
-fn transposed(m: Matrix) -> Matrix {
+/// XYZ of a point with luminance 1.
+fn xyz_from_xy([x, y]: [f64; 2]) -> [f64; 3] {
+    [x / y, 1.0, (1.0 - x - y) / y]
+}
+
+fn transpose(m: Matrix) -> Matrix {
     [0, 1, 2].map(|i| [0, 1, 2].map(|j| m[j][i]))
 }
 
-/// The product of a matrix and a column.
+/// The product of a matrix and a column vector.
 pub(crate) fn times(m: Matrix, v: [f64; 3]) -> [f64; 3] {
     m.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2])
 }
 
 fn product(a: Matrix, b: Matrix) -> Matrix {
-    transposed(transposed(b).map(|column| times(a, column)))
+    transpose(transpose(b).map(|column| times(a, column)))
 }
 
-/// The inverse by Cramer's rule. Of a singular matrix it is not finite.
+/// The inverse by Cramer's rule; not finite for a singular matrix.
 fn inverse(m: Matrix) -> Matrix {
-    let minor = |r: [usize; 2], c: [usize; 2]| {
-        m[r[0]][c[0]] * m[r[1]][c[1]] - m[r[0]][c[1]] * m[r[1]][c[0]]
-    };
-    let others = |i: usize| [[1, 2], [2, 0], [0, 1]][i];
-    let determinant: f64 = (0..3).map(|i| m[0][i] * minor([1, 2], others(i))).sum();
-    [0, 1, 2].map(|i| [0, 1, 2].map(|j| minor(others(j), others(i)) / determinant))
+    let determinant: f64 = (0..3).map(|i| m[0][i] * cofactor(m, 0, i)).sum();
+    [0, 1, 2].map(|i| [0, 1, 2].map(|j| cofactor(m, j, i) / determinant))
+}
+
+/// The cofactor of an element: the signed determinant of the matrix without its row and column.
+fn cofactor(m: Matrix, row: usize, column: usize) -> f64 {
+    // In this cyclic order, the determinant has the right sign.
+    const OTHERS: [[usize; 2]; 3] = [[1, 2], [2, 0], [0, 1]];
+    let (r, c) = (OTHERS[row], OTHERS[column]);
+    m[r[0]][c[0]] * m[r[1]][c[1]] - m[r[0]][c[1]] * m[r[1]][c[0]]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn close(found: Matrix, expected: Matrix, off: f64) {
+    fn assert_close(found: Matrix, expected: Matrix, tolerance: f64) {
         for (found, expected) in found.as_flattened().iter().zip(expected.as_flattened()) {
-            assert!((found - expected).abs() < off, "{found} {expected}");
+            assert!((found - expected).abs() < tolerance, "{found} {expected}");
         }
     }
 
@@ -109,8 +122,8 @@ mod tests {
             [0.22249, 0.71687, 0.06061],
             [0.01392, 0.09708, 0.71410],
         ];
-        close(Primaries::SRGB.to_xyz(), expected, 3e-4);
-        close(xyz_to_srgb(Primaries::SRGB.to_xyz()), IDENTITY, 1e-12);
+        assert_close(Primaries::SRGB.to_xyz(), expected, 3e-4);
+        assert_close(xyz_to_srgb(Primaries::SRGB.to_xyz()), IDENTITY, 1e-12);
     }
 
     /// The matrix of CSS Color 4, section 18, from linear Display P3 to linear sRGB.
@@ -121,11 +134,11 @@ mod tests {
             [-0.042_056_9, 1.042_057_1, 0.0],
             [-0.019_637_6, -0.078_636_1, 1.098_273_6],
         ];
-        close(Primaries::DISPLAY_P3.to_srgb(), expected, 1e-5);
+        assert_close(Primaries::DISPLAY_P3.to_srgb(), expected, 1e-5);
     }
 
     #[test]
     fn an_inverse_undoes_a_matrix() {
-        close(product(BRADFORD, inverse(BRADFORD)), IDENTITY, 1e-14);
+        assert_close(product(BRADFORD, inverse(BRADFORD)), IDENTITY, 1e-14);
     }
 }

@@ -1,8 +1,8 @@
-//! The curve of sRGB between codes and linear light (IEC 61966-2-1): [`light`], and [`SrgbCodes`] for the way back.
+//! Tone curve of sRGB (IEC 61966-2-1): values to linear light ([`light`]), and light to codes ([`SrgbCodes`]).
 
 use std::sync::LazyLock;
 
-/// Linear light of a value in [0, 1].
+/// Linear light of an sRGB value in [0, 1].
 pub(super) fn light(value: f64) -> f64 {
     if value <= 0.04045 {
         value / 12.92
@@ -11,44 +11,47 @@ pub(super) fn light(value: f64) -> f64 {
     }
 }
 
-/// The nearest codes of linear light.
+/// Lookup table from linear light to the nearest sRGB code.
 pub(super) struct SrgbCodes {
-    /// The least light of each code above 0: halfway, in codes, from the code below.
-    steps: Vec<f64>,
-    /// The code of the darkest light of each of [`Self::BINS`] equal parts of [0, 1].
-    first: Vec<u32>,
+    /// Lower limit in light of each code from 1: halfway, in codes, to the code below.
+    lower_limits: Vec<f64>,
+    /// Code of the lower end of each of [`Self::BINS`] equal bins of [0, 1], and of 1.
+    first_codes: Vec<u32>,
 }
 
-/// 8-bit codes.
+/// Lookup table for 8-bit codes.
 pub(super) static EIGHT: LazyLock<SrgbCodes> = LazyLock::new(|| SrgbCodes::up_to(255));
-/// 16-bit codes.
+/// Lookup table for 16-bit codes.
 pub(super) static SIXTEEN: LazyLock<SrgbCodes> = LazyLock::new(|| SrgbCodes::up_to(65_535));
 
 impl SrgbCodes {
-    /// The number of parts in which a search begins; chosen.
+    /// Number of bins that narrow the search; chosen.
     const BINS: usize = 4096;
 
-    fn up_to(most: u32) -> Self {
-        let step = |code: u32| light((f64::from(code) - 0.5) / f64::from(most));
-        let steps: Vec<f64> = (1..=most).map(step).collect();
-        let bins = 0..=Self::BINS;
-        let first = bins.map(|bin| {
-            let darkest = bin as f64 / Self::BINS as f64;
-            steps.partition_point(|step| *step <= darkest) as u32
-        });
+    fn up_to(max: u32) -> Self {
+        let lower_limits: Vec<f64> = (1..=max)
+            .map(|code| light((f64::from(code) - 0.5) / f64::from(max)))
+            .collect();
+        let first_codes = (0..=Self::BINS)
+            .map(|bin| {
+                let darkest = bin as f64 / Self::BINS as f64;
+                lower_limits.partition_point(|limit| *limit <= darkest) as u32
+            })
+            .collect();
         Self {
-            first: first.collect(),
-            steps,
+            lower_limits,
+            first_codes,
         }
     }
 
-    /// The nearest code of light, which is clamped to [0, 1].
+    /// The code nearest to a value of light, which is clamped to [0, 1].
     pub(super) fn encode(&self, light: f64) -> u32 {
         let light = light.clamp(0.0, 1.0);
         let bin = (light * Self::BINS as f64) as usize;
-        let (first, last) = (self.first[bin], self.first[(bin + 1).min(Self::BINS)]);
-        let steps = &self.steps[first as usize..last as usize];
-        first + steps.partition_point(|step| *step <= light) as u32
+        let first = self.first_codes[bin];
+        let last = self.first_codes[(bin + 1).min(Self::BINS)];
+        let limits = &self.lower_limits[first as usize..last as usize];
+        first + limits.partition_point(|limit| *limit <= light) as u32
     }
 }
 
@@ -57,16 +60,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn codes_come_back_and_steps_stand_between_them() {
-        for (codes, most) in [(&*EIGHT, 255), (&*SIXTEEN, 65_535)] {
-            let value = |code: f64| light(code / f64::from(most));
-            for code in 0..=most {
-                let at = f64::from(code);
-                assert_eq!(codes.encode(value(at)), code);
-                assert_eq!(codes.encode(value((at + 0.499).min(f64::from(most)))), code);
-                assert_eq!(codes.encode(value((at - 0.499).max(0.0))), code);
+    fn light_is_encoded_to_the_nearest_code() {
+        for (codes, max) in [(&*EIGHT, 255), (&*SIXTEEN, 65_535)] {
+            for code in 0..=max {
+                for offset in [-0.499, 0.0, 0.499] {
+                    let near = (f64::from(code) + offset).clamp(0.0, f64::from(max));
+                    assert_eq!(codes.encode(light(near / f64::from(max))), code);
+                }
             }
-            assert_eq!([codes.encode(-1.0), codes.encode(2.0)], [0, most]);
+            assert_eq!([codes.encode(-1.0), codes.encode(2.0)], [0, max]);
         }
     }
 }

@@ -32,7 +32,7 @@ fn gamma_and_primaries_of_srgb_are_srgb() {
     ] {
         assert!(is_srgb(&gamma(exponent, primaries)), "{exponent:?}");
     }
-    for (exponent, primaries, says) in [
+    for (exponent, primaries, expected) in [
         (Some(45_404), None, "is 0.45404; 0.45455 (sRGB) expected"),
         (Some(45_506), None, "is 0.45506"),
         (Some(55_556), Some(SRGB), "is 0.55556"),
@@ -43,7 +43,7 @@ fn gamma_and_primaries_of_srgb_are_srgb() {
         let problem = gamma(exponent, primaries)
             .meaning(CodeDepth::Eight)
             .unwrap_err();
-        assert!(problem.contains(says), "{problem}");
+        assert!(problem.contains(expected), "{problem}");
         assert!(problem.contains("--decode colour=ignore"), "{problem}");
     }
 }
@@ -71,7 +71,7 @@ fn code_points_are_converted_or_refused_by_name() {
         let note = space.note(ColourHandling::Converted);
         assert_eq!((&*note.from, note.profile), (name, None));
     }
-    for (points, says) in [
+    for (points, expected) in [
         ([9, 16, 0, 1], "PQ"),
         ([9, 18, 0, 1], "HLG"),
         ([1, 13, 0, 0], "narrow range"),
@@ -83,15 +83,15 @@ fn code_points_are_converted_or_refused_by_name() {
             .meaning(CodeDepth::Eight)
             .unwrap_err();
         assert!(
-            problem.contains(says) && problem.contains("--decode colour=ignore"),
+            problem.contains(expected) && problem.contains("--decode colour=ignore"),
             "{problem}"
         );
     }
 }
 
-/// Codes of video: black and white stay, and middle grey, whose light is BT.709's 0.2596, is the sRGB code of that light.
+/// Black and white stay; other BT.709 codes become the sRGB codes of the same light.
 #[test]
-fn the_curve_of_video_becomes_that_of_srgb() {
+fn bt709_codes_are_converted_to_srgb() {
     let Ok(Meaning::Other(space)) = ColourTag::CodePoints([1, 1, 0, 1]).meaning(CodeDepth::Eight)
     else {
         panic!("BT.709")
@@ -116,33 +116,41 @@ fn the_curve_of_video_becomes_that_of_srgb() {
     assert_ne!(samples, [0, 255, 128, 10, 20, 200]);
 }
 
+/// An ICC profile with this colour space, connection space and one empty tag.
+fn profile_header([space, connection, tag]: [&[u8; 4]; 3]) -> Vec<u8> {
+    let mut profile = vec![0; 128];
+    profile[16..20].copy_from_slice(space);
+    profile[20..24].copy_from_slice(connection);
+    profile.extend(1_u32.to_be_bytes());
+    profile.extend(tag);
+    profile.extend([0; 8]);
+    profile
+}
+
 #[test]
-fn profiles_that_cannot_be_read_are_refused_by_name() {
-    let header = |space: &[u8; 4], connection: &[u8; 4], tag: &[u8; 4]| {
-        let mut profile = vec![0; 128];
-        profile[16..20].copy_from_slice(space);
-        profile[20..24].copy_from_slice(connection);
-        profile.extend(1_u32.to_be_bytes());
-        profile.extend(tag);
-        profile.extend([0; 8]);
-        profile
-    };
-    for (profile, says) in [
-        (header(b"CMYK", b"Lab ", b"A2B0"), "for CMYK"),
-        (header(b"Lab ", b"XYZ ", b"desc"), "for Lab"),
-        (header(b"HSV ", b"XYZ ", b"desc"), "of the kind \"HSV\""),
-        (header(b"RGB ", b"XYZ ", b"A2B1"), "by tables (A2B)"),
+fn unsupported_profiles_are_refused_by_name() {
+    for (profile, expected) in [
+        (profile_header([b"CMYK", b"Lab ", b"A2B0"]), "for CMYK"),
+        (profile_header([b"Lab ", b"XYZ ", b"desc"]), "for Lab"),
         (
-            header(b"RGB ", b"Lab ", b"rXYZ"),
+            profile_header([b"HSV ", b"XYZ ", b"desc"]),
+            "of the kind \"HSV\"",
+        ),
+        (
+            profile_header([b"RGB ", b"XYZ ", b"A2B1"]),
+            "by tables (A2B)",
+        ),
+        (
+            profile_header([b"RGB ", b"Lab ", b"rXYZ"]),
             "connection space of the ICC profile",
         ),
-        (header(b"RGB ", b"XYZ ", b"rXYZ"), "broken"),
+        (profile_header([b"RGB ", b"XYZ ", b"rXYZ"]), "broken"),
         (vec![0; 100], "ends too early"),
     ] {
         let problem = ColourTag::Profile(profile)
             .meaning(CodeDepth::Eight)
             .unwrap_err();
-        assert!(problem.contains(says), "{says}: {problem}");
+        assert!(problem.contains(expected), "{expected}: {problem}");
         assert!(problem.contains("ICC profile") && problem.contains("--decode colour=ignore"));
     }
     for chunk in [&b"no end of the name"[..], b"name\0", b"name\0\0no deflate"] {

@@ -2,12 +2,12 @@ use std::io::Write as _;
 
 use super::*;
 
-/// A file of one array, as h5py writes it by default, with 16-bit numbers.
-struct Written {
+/// Writer of a file in the layout that h5py uses by default.
+struct FileWriter {
     file: Vec<u8>,
 }
 
-impl Written {
+impl FileWriter {
     fn new() -> Self {
         let mut file = SIGNATURE.to_vec();
         file.extend([0, 0, 0, 0, 0, 8, 8, 0, 4, 0, 16, 0, 0, 0, 0, 0]);
@@ -18,13 +18,15 @@ impl Written {
         Self { file }
     }
 
-    fn put(&mut self, bytes: &[u8]) -> u64 {
+    /// Appends a structure at the next multiple of 8 bytes and returns its address.
+    fn append(&mut self, bytes: &[u8]) -> u64 {
         self.file.resize(self.file.len().next_multiple_of(8), 0);
         let at = self.file.len() as u64;
         self.file.extend(bytes);
         at
     }
 
+    /// An object header of version 1 with these messages (type and data).
     fn header(messages: &[(u16, Vec<u8>)]) -> Vec<u8> {
         let mut body = Vec::new();
         for (kind, data) in messages {
@@ -45,44 +47,45 @@ impl Written {
     }
 }
 
-/// The bytes of 64-bit numbers.
-fn long(numbers: &[u64]) -> Vec<u8> {
+/// Little-endian bytes of 64-bit numbers.
+fn u64_bytes(numbers: &[u64]) -> Vec<u8> {
     numbers
         .iter()
         .flat_map(|number| number.to_le_bytes())
         .collect()
 }
 
-/// A file whose array has `rows` × `columns` numbers of a type, in chunks if their size is given.
+/// A file with one array of `size` (rows, columns) in storage of the given chunk size; contiguous without one. `class` and `bits` are the
+/// datatype fields of the numbers.
 fn file(class: u8, bits: u8, size: (u64, u64), data: &[u8], chunk: Option<(u64, u64)>) -> Vec<u8> {
     let width = data.len() as u64 / (size.0 * size.1);
-    let mut written = Written::new();
-    // The header of the root group comes first; its addresses are filled in last.
-    let root = written.put(&Written::header(&[(17, vec![0; 16])]));
+    let mut writer = FileWriter::new();
+    // The header of the root group comes first; its addresses are writer last.
+    let root = writer.append(&FileWriter::header(&[(17, vec![0; 16])]));
     assert_eq!(root, 96);
     let mut dataspace = vec![1, 2, 0, 0, 0, 0, 0, 0];
-    dataspace.extend(long(&[size.0, size.1]));
+    dataspace.extend(u64_bytes(&[size.0, size.1]));
     let mut datatype = vec![16 | class, bits, 0, 0];
     datatype.extend((width as u32).to_le_bytes());
     let mut messages = vec![(1, dataspace), (3, datatype)];
     match chunk {
         None => {
-            let at = written.put(data);
+            let at = writer.append(data);
             let mut layout = vec![3, 1];
-            layout.extend(long(&[at, data.len() as u64]));
+            layout.extend(u64_bytes(&[at, data.len() as u64]));
             messages.push((8, layout));
         }
-        Some((height, breadth)) => {
+        Some((height, chunk_width)) => {
             let mut entries = Vec::new();
             for top in (0..size.0).step_by(height as usize) {
-                for left in (0..size.1).step_by(breadth as usize) {
-                    let mut plain = vec![0; (height * breadth * width) as usize];
-                    for (row, column) in
-                        (0..height).flat_map(|row| (0..breadth).map(move |column| (row, column)))
+                for left in (0..size.1).step_by(chunk_width as usize) {
+                    let mut plain = vec![0; (height * chunk_width * width) as usize];
+                    for (row, column) in (0..height)
+                        .flat_map(|row| (0..chunk_width).map(move |column| (row, column)))
                     {
                         if top + row < size.0 && left + column < size.1 {
                             let from = (((top + row) * size.1 + left + column) * width) as usize;
-                            let to = ((row * breadth + column) * width) as usize;
+                            let to = ((row * chunk_width + column) * width) as usize;
                             plain[to..to + width as usize]
                                 .copy_from_slice(&data[from..from + width as usize]);
                         }
@@ -96,24 +99,24 @@ fn file(class: u8, bits: u8, size: (u64, u64), data: &[u8], chunk: Option<(u64, 
                         flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::fast());
                     deflated.write_all(&shuffled).unwrap();
                     let stored = deflated.finish().unwrap();
-                    let at = written.put(&stored);
+                    let at = writer.append(&stored);
                     let mut key = (stored.len() as u32).to_le_bytes().to_vec();
                     key.extend([0; 4]);
-                    key.extend(long(&[top, left, 0]));
+                    key.extend(u64_bytes(&[top, left, 0]));
                     entries.push((key, at));
                 }
             }
             let mut tree = b"TREE\x01\x00".to_vec();
             tree.extend((entries.len() as u16).to_le_bytes());
-            tree.extend(long(&[u64::MAX, u64::MAX]));
+            tree.extend(u64_bytes(&[u64::MAX, u64::MAX]));
             for (key, at) in entries {
                 tree.extend(key);
                 tree.extend(at.to_le_bytes());
             }
-            let at = written.put(&tree);
+            let at = writer.append(&tree);
             let mut layout = vec![3, 2, 3];
             layout.extend(at.to_le_bytes());
-            for side in [height, breadth, width] {
+            for side in [height, chunk_width, width] {
                 layout.extend((side as u32).to_le_bytes());
             }
             messages.push((8, layout));
@@ -129,23 +132,23 @@ fn file(class: u8, bits: u8, size: (u64, u64), data: &[u8], chunk: Option<(u64, 
             messages.push((11, filters));
         }
     }
-    let array = written.put(&Written::header(&messages));
-    let names = written.put(b"\0\0\0\0\0\0\0\0dataset\0");
+    let array = writer.append(&FileWriter::header(&messages));
+    let names = writer.append(b"\0\0\0\0\0\0\0\0dataset\0");
     let mut heap = b"HEAP\0\0\0\0".to_vec();
-    heap.extend(long(&[16, u64::MAX, names]));
-    let heap = written.put(&heap);
+    heap.extend(u64_bytes(&[16, u64::MAX, names]));
+    let heap = writer.append(&heap);
     let mut node = b"SNOD\x01\x00\x01\x00".to_vec();
-    node.extend(long(&[8, array, 0, 0, 0]));
-    let node = written.put(&node);
+    node.extend(u64_bytes(&[8, array, 0, 0, 0]));
+    let node = writer.append(&node);
     let mut tree = b"TREE\x00\x00\x01\x00".to_vec();
-    tree.extend(long(&[u64::MAX, u64::MAX, 0, node, 8]));
-    let tree = written.put(&tree);
-    written.file[120..136].copy_from_slice(&long(&[tree, heap]));
-    written.file
+    tree.extend(u64_bytes(&[u64::MAX, u64::MAX, 0, node, 8]));
+    let tree = writer.append(&tree);
+    writer.file[120..136].copy_from_slice(&u64_bytes(&[tree, heap]));
+    writer.file
 }
 
 #[test]
-fn integers_and_floats_are_read_whole_and_in_chunks() {
+fn contiguous_and_chunked_arrays_are_read() {
     let ids: Vec<i16> = (0..35).map(|number| number * 3 - 1).collect();
     let ids_bytes: Vec<u8> = ids.iter().flat_map(|id| id.to_le_bytes()).collect();
     let halves: Vec<u8> = (0..35_u16)
@@ -166,7 +169,7 @@ fn integers_and_floats_are_read_whole_and_in_chunks() {
 }
 
 #[test]
-fn broken_files_are_refused_and_nothing_breaks_down() {
+fn broken_files_are_refused_without_a_panic() {
     let ids: Vec<u8> = (0..70).collect();
     let whole = file(0, 8, (5, 7), &ids, Some((2, 3)));
     assert!(

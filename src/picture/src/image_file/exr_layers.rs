@@ -1,4 +1,4 @@
-//! OpenEXR files, which hold linear light: [`ExrFile`].
+//! OpenEXR files, whose samples are linear light: [`ExrFile`].
 
 use std::io::Cursor;
 
@@ -14,25 +14,25 @@ use crate::reading_rule::ReadingRule;
 /// The first four bytes of every OpenEXR file.
 pub(super) const SIGNATURE: &[u8] = b"\x76\x2F\x31\x01";
 
-/// The names of the channels of colour.
-const CHANNELS: [&str; 3] = ["R", "G", "B"];
+/// Names of the colour channels.
+const COLOUR_CHANNELS: [&str; 3] = ["R", "G", "B"];
 
-/// The most negative light that counts as black: filters leave such values at edges (chosen).
-const LEAST: f32 = -1e-3;
+/// Lowest sample that is accepted and set to black: filters leave small negative values at edges (chosen).
+const MIN_SAMPLE: f32 = -1e-3;
 
-/// How far primaries may be away from those of BT.709; files state them with six digits (chosen).
-const PRIMARIES_OFF: f64 = 1e-4;
+/// Tolerance for primaries that count as BT.709; files state six digits (chosen).
+const PRIMARIES_TOLERANCE: f64 = 1e-4;
 
-/// A file whose headers are read.
+/// The facts in the headers of an OpenEXR file.
 #[derive(Debug)]
 pub(super) struct ExrFile {
-    /// Width and height of the image, in pixels: of the display window.
+    /// Width and height of the display window, in pixels.
     pub(super) size: (u32, u32),
-    /// The number of layers with colours.
+    /// Number of layers with colour channels.
     pub(super) layers: usize,
-    /// The primaries of the light, if they are not those of BT.709.
+    /// Primaries of the light; `None` for those of BT.709.
     pub(super) primaries: Option<Primaries>,
-    /// Place of the first layer with colours among all.
+    /// Index of the first layer with colour channels.
     layer: usize,
 }
 
@@ -40,11 +40,11 @@ impl ExrFile {
     /// Reads the headers.
     ///
     /// # Errors
-    /// If they are broken, or no layer has the three channels of colour as floats, or the image is larger than the rule allows.
+    /// If they are broken, no layer has the three colour channels as floats, or the image is larger than the rule allows.
     pub(super) fn open(file: &[u8], rule: &ReadingRule) -> Result<Self, String> {
         let reader = block::read(Cursor::new(file), false).map_err(|e| unreadable(&e))?;
         let headers = reader.headers();
-        let mut layers = (0..headers.len()).filter(|place| has_colours(&headers[*place]));
+        let mut layers = (0..headers.len()).filter(|index| has_colours(&headers[*index]));
         let layer = layers.next().ok_or(
             "an OpenEXR image without a layer of the channels R, G and B; convert it to RGB first",
         )?;
@@ -54,20 +54,24 @@ impl ExrFile {
         for (width, height) in [size, (data.width(), data.height())] {
             rule.check_size(width, height)?;
         }
-        check(header)?;
-        let stated = header.shared_attributes.chromaticities.as_ref();
+        check_supported(header)?;
         Ok(Self {
             size: (size.0 as u32, size.1 as u32),
             layers: 1 + layers.count(),
-            primaries: stated.map(primaries).filter(are_others),
+            primaries: header
+                .shared_attributes
+                .chromaticities
+                .as_ref()
+                .map(primaries)
+                .filter(|primaries| !are_bt709(primaries)),
             layer,
         })
     }
 
-    /// The light, row by row, red first, as the file states it.
+    /// Decodes the linear light of the first layer with colours: red, green and blue of each pixel, row by row.
     ///
     /// # Errors
-    /// If the file is cut or damaged, transparent in places, or a number in it is no amount of light.
+    /// If the file is truncated or damaged, transparent in places, or has a sample that is negative or not finite.
     pub(super) fn light(&self, file: &[u8]) -> Result<Vec<f32>, String> {
         let reader = block::read(Cursor::new(file), false).map_err(|e| unreadable(&e))?;
         let header = &reader.headers()[self.layer];
@@ -78,14 +82,15 @@ impl ExrFile {
             .no_deep_data()
             .largest_resolution_level()
             .rgba_channels(
-                move |_, _| Collected::new(width * height),
-                move |collected: &mut Collected, at, (r, g, b, alpha): (f32, f32, f32, f32)| {
+                move |_, _| CollectedLight::new(width * height),
+                move |collected: &mut CollectedLight, at, pixel: (f32, f32, f32, f32)| {
+                    let (r, g, b, alpha) = pixel;
                     let at: Vec2<i32> = at.to_i32() + shift;
                     let inside =
                         (0..width as i32).contains(&at.x()) && (0..height as i32).contains(&at.y());
                     if inside {
-                        let place = at.y() as usize * width + at.x() as usize;
-                        collected.light[3 * place..][..3].copy_from_slice(&[r, g, b]);
+                        let index = at.y() as usize * width + at.x() as usize;
+                        collected.light[3 * index..][..3].copy_from_slice(&[r, g, b]);
                         collected.is_opaque &= alpha >= 1.0;
                     }
                 },
@@ -104,13 +109,13 @@ impl ExrFile {
             return Err("the image is transparent in places; flatten it first".to_owned());
         }
         let mut light = collected.light;
-        for (place, sample) in light.iter_mut().enumerate() {
-            if !sample.is_finite() || *sample < LEAST {
-                let (x, y) = (place / 3 % width, place / 3 / width);
+        for (index, sample) in light.iter_mut().enumerate() {
+            if !sample.is_finite() || *sample < MIN_SAMPLE {
+                let (x, y) = (index / 3 % width, index / 3 / width);
                 return Err(format!(
                     "{sample} at the pixel ({x}, {y}), channel {}, is not an amount of light; finite numbers from 0 expected, correct \
                      them in the program that wrote the file",
-                    CHANNELS[place % 3]
+                    COLOUR_CHANNELS[index % 3]
                 ));
             }
             *sample = sample.max(0.0);
@@ -119,13 +124,13 @@ impl ExrFile {
     }
 }
 
-/// The samples that are read.
-struct Collected {
+/// Samples of the display window, collected while the file is decoded.
+struct CollectedLight {
     light: Vec<f32>,
     is_opaque: bool,
 }
 
-impl Collected {
+impl CollectedLight {
     fn new(pixels: usize) -> Self {
         Self {
             light: vec![0.0; 3 * pixels],
@@ -134,18 +139,18 @@ impl Collected {
     }
 }
 
-/// Whether a layer is flat and has the three channels of colour.
+/// True if a layer is flat (not deep data) and has the three colour channels.
 fn has_colours(header: &Header) -> bool {
     !header.deep
-        && CHANNELS.iter().all(|name| {
+        && COLOUR_CHANNELS.iter().all(|name| {
             let name = Text::from(*name);
             header.channels.find_index_of_channel(&name).is_some()
         })
 }
 
-/// Checks that the channels are floats, that they are not compressed by DWA, and that the layer covers the image.
-fn check(header: &Header) -> Result<(), String> {
-    // Their decoder takes the sizes of its memory from the file, however large they are (found by mutated files).
+/// Checks that the channels are floats, that the compression is not DWA, and that the layer covers the display window.
+fn check_supported(header: &Header) -> Result<(), String> {
+    // The decoder of DWA allocates as much memory as the file states (found with mutated files).
     if matches!(
         header.compression,
         Compression::DWAA(_) | Compression::DWAB(_)
@@ -153,31 +158,33 @@ fn check(header: &Header) -> Result<(), String> {
         let problem = "an OpenEXR image of the lossy compression DWAA or DWAB, which is not read; save it with ZIP or PIZ";
         return Err(problem.to_owned());
     }
-    let mut used = header.channels.list.iter().filter(|channel| {
-        let name = channel.name.to_string();
-        name == "A" || CHANNELS.contains(&&*name)
-    });
-    if used.any(|channel| channel.sample_type == SampleType::U32) {
+    let has_integers = header
+        .channels
+        .list
+        .iter()
+        .filter(|channel| {
+            let name = channel.name.to_string();
+            name == "A" || COLOUR_CHANNELS.contains(&&*name)
+        })
+        .any(|channel| channel.sample_type == SampleType::U32);
+    if has_integers {
         let problem = "an OpenEXR image of whole numbers; 16- or 32-bit floats expected";
         return Err(problem.to_owned());
     }
     let window = header.shared_attributes.display_window;
-    let (start, end) = (
+    let (start, size) = (
         header.own_attributes.layer_position - window.position,
         header.layer_size.to_i32(),
     );
-    let covers = |start: i32, length: i32, side: usize| {
-        start <= 0 && i64::from(start) + i64::from(length) >= side as i64
-    };
-    if covers(start.x(), end.x(), window.size.width())
-        && covers(start.y(), end.y(), window.size.height())
+    if covers(start.x(), size.x(), window.size.width())
+        && covers(start.y(), size.y(), window.size.height())
     {
         return Ok(());
     }
     Err(format!(
         "its data window ({} × {} pixels from {}, {}) does not cover its display window of {} × {}, so that a part of the image is missing; crop it first",
-        end.x(),
-        end.y(),
+        size.x(),
+        size.y(),
         start.x(),
         start.y(),
         window.size.width(),
@@ -185,23 +192,32 @@ fn check(header: &Header) -> Result<(), String> {
     ))
 }
 
+/// True if an interval covers 0 to `side`.
+fn covers(start: i32, length: i32, side: usize) -> bool {
+    start <= 0 && i64::from(start) + i64::from(length) >= side as i64
+}
+
 fn primaries(stated: &Chromaticities) -> Primaries {
-    let pair = |at: Vec2<f32>| [f64::from(at.x()), f64::from(at.y())];
     Primaries {
-        red: pair(stated.red),
-        green: pair(stated.green),
-        blue: pair(stated.blue),
-        white: pair(stated.white),
+        red: xy(stated.red),
+        green: xy(stated.green),
+        blue: xy(stated.blue),
+        white: xy(stated.white),
     }
 }
 
-fn are_others(found: &Primaries) -> bool {
-    let numbers = |of: &Primaries| [of.red, of.green, of.blue, of.white];
-    let mut off = numbers(found)
-        .into_iter()
-        .zip(numbers(&Primaries::SRGB))
-        .flat_map(|(a, b)| [a[0] - b[0], a[1] - b[1]]);
-    off.any(|off| off.is_nan() || off.abs() > PRIMARIES_OFF)
+fn xy(point: Vec2<f32>) -> [f64; 2] {
+    [f64::from(point.x()), f64::from(point.y())]
+}
+
+/// True if the primaries are those of BT.709, which are also those of sRGB.
+fn are_bt709(found: &Primaries) -> bool {
+    found
+        .points()
+        .as_flattened()
+        .iter()
+        .zip(Primaries::SRGB.points().as_flattened())
+        .all(|(found, expected)| (found - expected).abs() <= PRIMARIES_TOLERANCE)
 }
 
 fn unreadable(e: &exr::error::Error) -> String {

@@ -1,35 +1,35 @@
-//! [`FileFacts`]: the properties of an image file other than its pixels; unsupported, cut and damaged files.
+//! Facts in the headers of an image file ([`FileFacts`]), and detection of truncated and damaged files ([`fault`]).
 
 use image::metadata::Orientation;
 
 use super::exr_layers::ExrFile;
 use super::format::FileFormat;
 use super::jpeg_markers::{self, JpegProperties};
-use super::png_chunks::{self, PngFault, PngOutline};
+use super::png_chunks::{self, PngFault, PngProperties};
 use super::tiff_tags::TiffProperties;
-use super::webp_chunks::{self, WebpOutline};
+use super::webp_chunks::{self, WebpProperties};
 use crate::colour::ColourTag;
 use crate::reading_rule::ReadingRule;
 use darkqa_ground::files::guarded::guarded;
 
-/// The facts of a file beside its pixels.
+/// Facts in the headers of an image file that decide how it is decoded.
 #[derive(Debug)]
 pub(super) struct FileFacts {
-    /// The orientation that the file states; no turn if it states none, or none of the eight values.
+    /// EXIF orientation; no transform if it is missing or invalid.
     pub(super) orientation: Orientation,
-    /// Kind of the file, if it has several pictures; only the first is read.
+    /// Kind of a file with several pictures, of which only the first is read; else `None`.
     pub(super) first_of: Option<&'static str>,
     pub(super) colour: ColourTag,
     pub(super) depth: Depth,
-    /// The form of the inks of a JPEG of four components or a TIFF of four inks; `None` for other files.
+    /// Form of the ink amounts of a CMYK file; `None` for other files.
     pub(super) inks: Option<InkForm>,
-    /// Why the file cannot be shown as it is; `None` if nothing is known before it is decoded.
-    pub(super) unshowable: Option<String>,
-    /// The bytes that the file has at least if it is whole; `None` if its header does not tell.
-    whole: Option<u64>,
+    /// Reason why the file is not supported; `None` if the headers show none.
+    pub(super) unsupported: Option<String>,
+    /// Minimum length of the complete file, in bytes; `None` if the headers do not tell.
+    complete_length: Option<u64>,
 }
 
-/// The numbers that the samples of a file are.
+/// Number type of the samples of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Depth {
     /// Codes of at most 8 bits.
@@ -40,12 +40,12 @@ pub(super) enum Depth {
     Float,
 }
 
-/// How a file holds amounts of ink.
+/// Form of the ink amounts of a CMYK file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum InkForm {
     /// A JPEG in which 0 is no ink.
     Plain,
-    /// A JPEG in which 255 is no ink, as Adobe's programs write it.
+    /// A JPEG in which 255 is no ink, as written by Adobe's programs.
     Adobe,
     /// A TIFF, in which 0 is no ink.
     Tiff,
@@ -58,68 +58,58 @@ impl FileFacts {
         colour: ColourTag::None,
         depth: Depth::Eight,
         inks: None,
-        unshowable: None,
-        whole: None,
+        unsupported: None,
+        complete_length: None,
     };
 
     pub(super) fn read(file: &[u8], format: FileFormat) -> Self {
-        let of_exif = |exif: Option<&[u8]>| exif.and_then(Orientation::from_exif_chunk);
-        let several = |pictures: usize, kind| (pictures > 1).then_some(kind);
-        let profile =
-            |profile: Option<Vec<u8>>| profile.map_or(ColourTag::None, ColourTag::Profile);
-        let turn = |stated: Option<Orientation>| stated.unwrap_or(Orientation::NoTransforms);
-        let deep = |bits| {
-            if bits == 16 {
-                Depth::Sixteen
-            } else {
-                Depth::Eight
-            }
-        };
         match format {
             FileFormat::Png => {
-                let outline = PngOutline::parse(file);
+                let properties = PngProperties::parse(file);
                 Self {
-                    orientation: turn(of_exif(outline.exif)),
-                    first_of: several(outline.frames, "animated PNG"),
-                    colour: outline.colour,
-                    depth: deep(outline.bits.into()),
+                    orientation: exif_orientation(properties.exif),
+                    first_of: kind_if_several(properties.frames, "animated PNG"),
+                    colour: properties.colour,
+                    depth: code_depth(properties.bits.into()),
                     ..Self::NONE
                 }
             }
             FileFormat::Jpeg => {
-                let outline = JpegProperties::parse(file);
-                let form = if outline.is_adobe {
+                let properties = JpegProperties::parse(file);
+                let form = if properties.is_adobe {
                     InkForm::Adobe
                 } else {
                     InkForm::Plain
                 };
                 Self {
-                    orientation: turn(of_exif(outline.exif)),
-                    inks: (outline.components == Some(4)).then_some(form),
-                    colour: profile(outline.profile()),
+                    orientation: exif_orientation(properties.exif),
+                    inks: (properties.components == Some(4)).then_some(form),
+                    colour: profile_tag(properties.profile()),
                     ..Self::NONE
                 }
             }
             FileFormat::WebP => {
-                let outline = WebpOutline::parse(file);
+                let properties = WebpProperties::parse(file);
                 Self {
-                    orientation: turn(of_exif(outline.exif)),
-                    first_of: several(outline.frames, "animated WebP"),
-                    colour: profile(outline.profile.map(<[u8]>::to_vec)),
+                    orientation: exif_orientation(properties.exif),
+                    first_of: kind_if_several(properties.frames, "animated WebP"),
+                    colour: profile_tag(properties.profile.map(<[u8]>::to_vec)),
                     ..Self::NONE
                 }
             }
             FileFormat::Tiff => {
-                let outline = TiffProperties::parse(file);
-                let stated = u8::try_from(outline.orientation).ok();
+                let properties = TiffProperties::parse(file);
+                let stated = u8::try_from(properties.orientation).ok();
                 Self {
-                    orientation: turn(stated.and_then(Orientation::from_exif)),
-                    first_of: several(outline.pages, "TIFF of several pages"),
-                    colour: profile(outline.profile.map(<[u8]>::to_vec)),
-                    depth: deep(outline.bits),
-                    inks: outline.is_cmyk.then_some(InkForm::Tiff),
-                    unshowable: unshowable(&outline),
-                    whole: Some(outline.end),
+                    orientation: stated
+                        .and_then(Orientation::from_exif)
+                        .unwrap_or(Orientation::NoTransforms),
+                    first_of: kind_if_several(properties.pages, "TIFF of several pages"),
+                    colour: profile_tag(properties.profile.map(<[u8]>::to_vec)),
+                    depth: code_depth(properties.bits),
+                    inks: properties.is_cmyk.then_some(InkForm::Tiff),
+                    unsupported: unsupported_tiff(&properties),
+                    complete_length: Some(properties.end),
                 }
             }
             FileFormat::Bmp => Self::NONE,
@@ -128,7 +118,7 @@ impl FileFacts {
                 let layers = opened.as_ref().map_or(0, |file| file.layers);
                 let primaries = opened.and_then(|file| file.primaries);
                 Self {
-                    first_of: several(layers, "OpenEXR of several layers"),
+                    first_of: kind_if_several(layers, "OpenEXR of several layers"),
                     colour: primaries.map_or(ColourTag::None, ColourTag::Primaries),
                     depth: Depth::Float,
                     ..Self::NONE
@@ -138,42 +128,67 @@ impl FileFacts {
     }
 }
 
-/// Why a TIFF cannot be shown as it is; `None` if nothing is known before it is decoded.
-fn unshowable(outline: &TiffProperties<'_>) -> Option<String> {
-    if outline.is_raw {
+fn exif_orientation(exif: Option<&[u8]>) -> Orientation {
+    exif.and_then(Orientation::from_exif_chunk)
+        .unwrap_or(Orientation::NoTransforms)
+}
+
+fn kind_if_several(pictures: usize, kind: &'static str) -> Option<&'static str> {
+    (pictures > 1).then_some(kind)
+}
+
+fn profile_tag(profile: Option<Vec<u8>>) -> ColourTag {
+    profile.map_or(ColourTag::None, ColourTag::Profile)
+}
+
+fn code_depth(bits: u64) -> Depth {
+    if bits == 16 {
+        Depth::Sixteen
+    } else {
+        Depth::Eight
+    }
+}
+
+/// Reason why a TIFF file is not supported; `None` if its tags show none.
+fn unsupported_tiff(properties: &TiffProperties<'_>) -> Option<String> {
+    if properties.is_raw {
         let problem = "a camera's RAW file: only its preview could be read; develop it to a 16-bit TIFF or PNG first";
         return Some(problem.to_owned());
     }
-    if outline.is_float {
+    if properties.is_float {
         let problem = "a TIFF of floating-point samples; 8 or 16 bits expected, or OpenEXR for linear light: convert it first";
         return Some(problem.to_owned());
     }
-    let colours = outline.colours?;
+    let colours = properties.colours?;
     Some(format!("{colours}; convert it to RGB first"))
 }
 
-/// The first fault of a file that is cut or damaged; `None` if there is none.
+/// The first fault of a truncated or damaged file; `None` for a complete one.
 pub(super) fn fault(file: &[u8], format: FileFormat, facts: &FileFacts) -> Option<String> {
-    let cut = || format!("the file ends before its end mark, at byte {}", file.len());
-    let short = |whole: u64| format!("the file ends at byte {} of {whole}", file.len());
     match format {
         FileFormat::Png => png_chunks::fault(file).map(|fault| match fault {
-            PngFault::Cut => cut(),
+            PngFault::Cut => no_end_mark(file),
             PngFault::Checksum => "a checksum in it is wrong".to_owned(),
         }),
-        FileFormat::Jpeg => (!jpeg_markers::ends(file)).then(cut),
-        FileFormat::WebP => webp_chunks::missing(file).map(short),
-        FileFormat::Tiff => {
-            let whole = facts.whole?;
-            (whole > file.len() as u64).then(|| short(whole))
-        }
+        FileFormat::Jpeg => (!jpeg_markers::has_end(file)).then(|| no_end_mark(file)),
+        FileFormat::WebP => truncation(file, webp_chunks::stated_length(file)?),
+        FileFormat::Tiff => truncation(file, facts.complete_length?),
         FileFormat::Bmp => {
-            // The length of the file stands behind its mark; some programs leave it at 0.
-            let length = file.get(2..6).and_then(|bytes| bytes.try_into().ok());
-            let length = u64::from(length.map_or(0, u32::from_le_bytes));
-            (length > file.len() as u64).then(|| short(length))
+            // The header states the length of the file; some programs leave it at 0.
+            let length = file.get(2..6).and_then(|bytes| bytes.try_into().ok())?;
+            truncation(file, u64::from(u32::from_le_bytes(length)))
         }
         // The OpenEXR reader names the missing part.
         FileFormat::OpenExr => None,
     }
+}
+
+fn no_end_mark(file: &[u8]) -> String {
+    format!("the file ends before its end mark, at byte {}", file.len())
+}
+
+/// The fault of a file that is shorter than `complete_length` bytes; `None` if it is not.
+fn truncation(file: &[u8], complete_length: u64) -> Option<String> {
+    (complete_length > file.len() as u64)
+        .then(|| format!("the file ends at byte {} of {complete_length}", file.len()))
 }

@@ -1,33 +1,33 @@
-//! The format of an image file, from its first bytes: [`FileFormat`].
+//! Detection of the format of an image file from its first bytes: [`FileFormat`].
 
 use image::ImageFormat;
 
-/// A format that is read.
+/// A supported image format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FileFormat {
-    /// PNG, of its frames the first.
+    /// PNG; of an animation, the first frame.
     Png,
     /// JPEG.
     Jpeg,
-    /// WebP, of its frames the first.
+    /// WebP; of an animation, the first frame.
     WebP,
-    /// TIFF, of its pages the first.
+    /// TIFF; of several pages, the first.
     Tiff,
     /// Windows bitmap.
     Bmp,
-    /// OpenEXR, linear light.
+    /// OpenEXR, whose samples are linear light.
     OpenExr,
 }
 
-/// The names of the formats that are read, for messages.
-pub const READ: &str = "PNG, JPEG, WebP, TIFF, BMP or OpenEXR";
+/// Names of the supported formats, for messages.
+pub const SUPPORTED_FORMATS: &str = "PNG, JPEG, WebP, TIFF, BMP or OpenEXR";
 
 /// Remedy for images in unsupported formats.
 const CONVERT: &str = "convert it to PNG, TIFF or JPEG first";
 const DEVELOP: &str = "develop it to a 16-bit TIFF or PNG first";
 
-/// Formats that are not read: where their mark stands in the file, the mark, the name, and what to do.
-const UNREAD: [(usize, &[u8], &str, &str); 23] = [
+/// Known unsupported formats: offset of the signature, the signature, the name, and the remedy.
+const UNSUPPORTED: [(usize, &[u8], &str, &str); 23] = [
     (4, b"ftypavif", "an AVIF image", CONVERT),
     (4, b"ftypavis", "an AVIF image sequence", CONVERT),
     (4, b"ftypheic", HEIC, CONVERT),
@@ -66,12 +66,13 @@ impl FileFormat {
     /// # Errors
     /// If the format is not supported. The error names it, if known, and the remedy.
     pub fn detect(file: &[u8]) -> Result<Self, String> {
-        let has =
-            |at: usize, mark: &[u8]| file.get(at..).is_some_and(|rest| rest.starts_with(mark));
-        if let Some((.., name, remedy)) = UNREAD.iter().find(|(at, mark, ..)| has(*at, mark)) {
+        if let Some((.., name, remedy)) = UNSUPPORTED
+            .iter()
+            .find(|(offset, signature, ..)| has_signature(file, *offset, signature))
+        {
             return Err(format!("{name}, which is not read; {remedy}"));
         }
-        let marks: [(&[u8], Self); 8] = [
+        let signatures: [(&[u8], Self); 8] = [
             (super::png_chunks::SIGNATURE, Self::Png),
             (b"\xFF\xD8\xFF", Self::Jpeg),
             (super::exr_layers::SIGNATURE, Self::OpenExr),
@@ -81,17 +82,17 @@ impl FileFormat {
             (b"MM\0+", Self::Tiff),
             (b"BM", Self::Bmp),
         ];
-        if has(0, b"RIFF") && has(8, b"WEBP") {
+        if has_signature(file, 0, b"RIFF") && has_signature(file, 8, b"WEBP") {
             return Ok(Self::WebP);
         }
-        marks
+        signatures
             .into_iter()
-            .find(|(mark, _)| has(0, mark))
+            .find(|(signature, _)| file.starts_with(signature))
             .map(|(_, format)| format)
-            .ok_or_else(|| format!("not an image: {READ} expected"))
+            .ok_or_else(|| format!("not an image: {SUPPORTED_FORMATS} expected"))
     }
 
-    /// The format as the decoder of codes knows it; `None` for a format of light.
+    /// The decoder in the crate `image`; `None` for OpenEXR, which has its own decoder.
     pub(super) fn decoder(self) -> Option<ImageFormat> {
         match self {
             Self::Png => Some(ImageFormat::Png),
@@ -115,8 +116,8 @@ impl FileFormat {
         }
     }
 
-    /// The usual ending of a file's name.
-    pub(super) fn ending(self) -> &'static str {
+    /// The usual file name extension.
+    pub(super) fn extension(self) -> &'static str {
         match self {
             Self::Png => "png",
             Self::Jpeg => "jpg",
@@ -128,18 +129,28 @@ impl FileFormat {
     }
 }
 
+fn has_signature(file: &[u8], offset: usize, signature: &[u8]) -> bool {
+    file.get(offset..)
+        .is_some_and(|rest| rest.starts_with(signature))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn formats_are_known_by_their_first_bytes() {
-        let of = |file: &[u8]| FileFormat::detect(file);
-        assert_eq!(of(b"\xFF\xD8\xFF\xE0"), Ok(FileFormat::Jpeg));
-        assert_eq!(of(b"RIFF\x10\0\0\0WEBPVP8 "), Ok(FileFormat::WebP));
-        assert_eq!(of(b"MM\0*\0\0\0\x08"), Ok(FileFormat::Tiff));
-        assert_eq!(of(b"BM\x36\0\0\0"), Ok(FileFormat::Bmp));
-        for (file, says) in [
+        assert_eq!(
+            FileFormat::detect(b"\xFF\xD8\xFF\xE0"),
+            Ok(FileFormat::Jpeg)
+        );
+        assert_eq!(
+            FileFormat::detect(b"RIFF\x10\0\0\0WEBPVP8 "),
+            Ok(FileFormat::WebP)
+        );
+        assert_eq!(FileFormat::detect(b"MM\0*\0\0\0\x08"), Ok(FileFormat::Tiff));
+        assert_eq!(FileFormat::detect(b"BM\x36\0\0\0"), Ok(FileFormat::Bmp));
+        for (file, expected) in [
             (
                 &b"\0\0\0\x18ftypheic\0\0\0\0"[..],
                 "HEIC image, which is not read; convert",
@@ -161,8 +172,8 @@ mod tests {
             (b"", "not an image"),
             (b"ab", "not an image"),
         ] {
-            let problem = of(file).unwrap_err();
-            assert!(problem.contains(says), "{problem}");
+            let problem = FileFormat::detect(file).unwrap_err();
+            assert!(problem.contains(expected), "{problem}");
         }
     }
 }

@@ -1,7 +1,7 @@
-//! The facts of a JPEG file that its markers hold: [`JpegProperties`]; and whether it has its end: [`ends`].
+//! Facts of a JPEG file from its markers: [`JpegProperties`], and the check for its end marker: [`has_end`].
 //!
-//! The decoder converts CMYK to RGB without regard to its profile, and fills the missing part of a truncated file with grey. Models
-//! would be asked about either as if it were the image.
+//! The decoder converts CMYK to RGB without the ICC profile, and fills the missing part of a truncated file with grey. Both must be
+//! detected here, because models would be asked about the wrong image.
 
 /// Start of the segment with the EXIF data (EXIF 2.32, section 4.5.5).
 const EXIF: &[u8] = b"Exif\0\0";
@@ -9,71 +9,71 @@ const EXIF: &[u8] = b"Exif\0\0";
 /// Start of a segment with a part of an ICC profile.
 const PROFILE: &[u8] = b"ICC_PROFILE\0";
 
-/// Start of the segment that Adobe's programs write, in which inks are inverted.
+/// Start of the segment that Adobe's programs write; with it, ink amounts are inverted.
 const ADOBE: &[u8] = b"Adobe";
 
-/// Markers of the application segments with EXIF data (APP1), with a profile (APP2), and of Adobe (APP14).
+/// Markers of application segments: EXIF data (APP1), ICC profile (APP2), Adobe (APP14).
 const APP1: u8 = 0xE1;
 const APP2: u8 = 0xE2;
 const APP14: u8 = 0xEE;
 
-/// Marker before the coded samples (SOS), after which no header follows.
-const SAMPLES: u8 = 0xDA;
+/// Marker before the coded samples (SOS). No headers follow it.
+const START_OF_SCAN: u8 = 0xDA;
 
-/// The facts of a JPEG file in its headers (ITU-T T.81, annex B).
+/// Facts in the headers of a JPEG file (ITU-T T.81, annex B).
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(super) struct JpegProperties<'a> {
-    /// The components of a pixel: 1 for grey, 3 for colour, 4 for CMYK or YCCK; `None` without a frame header.
+    /// Number of components per pixel: 1 for grey, 3 for colour, 4 for CMYK or YCCK; `None` without a frame header.
     pub(super) components: Option<u8>,
-    /// The EXIF data, a TIFF structure; `None` if there are none.
+    /// EXIF data (a TIFF structure), if the file has any.
     pub(super) exif: Option<&'a [u8]>,
-    /// Whether the file has Adobe's marker.
+    /// True if the file has Adobe's marker.
     pub(super) is_adobe: bool,
-    /// The parts of the ICC profile, each with its number from 1 (ICC.1:2022, section B.4).
-    profile: Vec<(u8, &'a [u8])>,
+    /// Parts of the ICC profile with their numbers, from 1 (ICC.1:2022, section B.4).
+    profile_parts: Vec<(u8, &'a [u8])>,
 }
 
 impl<'a> JpegProperties<'a> {
-    /// Reads the markers one after another up to the samples; a truncated file is read up to its end.
+    /// Reads the markers in order, up to the coded samples or the end of a truncated file.
     pub(super) fn parse(file: &'a [u8]) -> Self {
-        let mut outline = Self::default();
-        for (marker, segment) in Segments(file).take_while(|(marker, _)| *marker != SAMPLES) {
-            if is_frame_header(marker) && outline.components.is_none() {
-                // It follows the precision (1 byte), the height and the width (2 bytes each).
-                outline.components = segment.get(5).copied();
+        let mut properties = Self::default();
+        for (marker, segment) in Segments(file).take_while(|(marker, _)| *marker != START_OF_SCAN) {
+            if is_frame_header(marker) && properties.components.is_none() {
+                // The number of components follows the precision (1 byte), height and width (2 bytes each).
+                properties.components = segment.get(5).copied();
             }
-            if marker == APP1 && outline.exif.is_none() {
-                outline.exif = segment.strip_prefix(EXIF);
+            if marker == APP1 && properties.exif.is_none() {
+                properties.exif = segment.strip_prefix(EXIF);
             }
-            outline.is_adobe |= marker == APP14 && segment.starts_with(ADOBE);
+            properties.is_adobe |= marker == APP14 && segment.starts_with(ADOBE);
             let part = segment.strip_prefix(PROFILE).filter(|_| marker == APP2);
             if let Some([number, _, part @ ..]) = part {
-                outline.profile.push((*number, part));
+                properties.profile_parts.push((*number, part));
             }
         }
-        outline
+        properties
     }
 
-    /// The ICC profile; `None` if there is none.
+    /// ICC profile, if the file has one.
     pub(super) fn profile(mut self) -> Option<Vec<u8>> {
-        if self.profile.is_empty() {
+        if self.profile_parts.is_empty() {
             return None;
         }
-        self.profile.sort_by_key(|(number, _)| *number);
-        let parts: Vec<&[u8]> = self.profile.iter().map(|(_, part)| *part).collect();
+        self.profile_parts.sort_by_key(|(number, _)| *number);
+        let parts: Vec<&[u8]> = self.profile_parts.iter().map(|(_, part)| *part).collect();
         Some(parts.concat())
     }
 }
 
-/// Whether the file has its end marker (EOI).
-pub(super) fn ends(file: &[u8]) -> bool {
+/// True if the file has its end marker (EOI).
+pub(super) fn has_end(file: &[u8]) -> bool {
     Segments(file).any(|(marker, _)| marker == END)
 }
 
 /// Marker at the end of the file (EOI).
 const END: u8 = 0xD9;
 
-/// The markers of a file with their segments, up to the end marker, or to the point where the file breaks off.
+/// Iterator over the markers of a file with their segments, up to the end marker or the end of a truncated file.
 struct Segments<'a>(&'a [u8]);
 
 impl<'a> Iterator for Segments<'a> {
@@ -81,7 +81,7 @@ impl<'a> Iterator for Segments<'a> {
 
     fn next(&mut self) -> Option<Self::Item> {
         let (marker, rest) = next_marker(self.0)?;
-        // A file that breaks off within a segment has no further one.
+        // If the file ends within this segment, the iteration ends.
         self.0 = &[];
         match marker {
             END => {}
@@ -97,7 +97,7 @@ impl<'a> Iterator for Segments<'a> {
     }
 }
 
-/// The code of the next marker, and the bytes after it. In coded samples, 0xFF is followed by 0.
+/// The next marker, and the bytes after it. In coded samples, 0xFF is followed by 0.
 fn next_marker(bytes: &[u8]) -> Option<(u8, &[u8])> {
     let at = bytes
         .windows(2)
@@ -105,13 +105,13 @@ fn next_marker(bytes: &[u8]) -> Option<(u8, &[u8])> {
     Some((bytes[at + 1], &bytes[at + 2..]))
 }
 
-/// The content of the first segment, and the bytes after it. Its length field counts its own two bytes.
+/// The content of the first segment, and the bytes after it. The length field includes its own two bytes.
 fn segment(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
     let (length, rest) = bytes.split_first_chunk::<2>()?;
     rest.split_at_checked(usize::from(u16::from_be_bytes(*length)).checked_sub(2)?)
 }
 
-/// Whether a marker is one of SOF0 to SOF15. Three codes in that range mean something else (DHT, JPG, DAC).
+/// True for the markers SOF0 to SOF15. Three codes in that range are other markers (DHT, JPG, DAC).
 fn is_frame_header(marker: u8) -> bool {
     matches!(marker, 0xC0..=0xCF) && !matches!(marker, 0xC4 | 0xC8 | 0xCC)
 }
@@ -130,30 +130,28 @@ mod tests {
         let mut grey = HEAD;
         grey[11] = 1;
         let file = [&grey[..2], &inner[..], &grey[2..], &TAIL].concat();
-        let components = |file| JpegProperties::parse(file).components;
-        assert_eq!((components(&file), ends(&file)), (Some(1), true));
+        assert_eq!(JpegProperties::parse(&file).components, Some(1));
+        assert!(has_end(&file));
         for length in 0..file.len() {
             let expected = (length >= file.len() - TAIL.len()).then_some(1);
             let cut = &file[..length];
-            assert_eq!(
-                (components(cut), ends(cut)),
-                (expected, false),
-                "cut at {length}"
-            );
+            let components = JpegProperties::parse(cut).components;
+            assert_eq!(components, expected, "cut at {length}");
+            assert!(!has_end(cut), "cut at {length}");
         }
     }
 
     #[test]
-    fn a_wrong_length_ends_the_reading() {
+    fn a_wrong_segment_length_ends_parsing() {
         for length in [[0, 0], [0, 1], [0xFF, 0xFF]] {
             let file = [&[0xFF, 0xD8, 0xFF, 0xC0][..], &length, &TAIL].concat();
             assert_eq!(JpegProperties::parse(&file), JpegProperties::default());
-            assert!(!ends(&file));
+            assert!(!has_end(&file));
         }
     }
 
     #[test]
-    fn exif_data_are_found_before_the_samples_only() {
+    fn exif_data_are_found_only_before_the_samples() {
         let exif = [0xFF, 0xE1, 0, 10, b'E', b'x', b'i', b'f', 0, 0, 7, 9];
         let other = [0xFF, 0xE1, 0, 6, b'h', b't', b't', b'p'];
         let file = [&HEAD[..2], &other, &exif, &HEAD[2..], &TAIL].concat();

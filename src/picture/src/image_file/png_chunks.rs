@@ -1,4 +1,4 @@
-//! The facts of a PNG file in its chunks: [`PngOutline`]; and the first fault in them: [`fault`].
+//! Facts of a PNG file from its chunks: [`PngProperties`], and the first fault in them: [`fault`].
 
 use std::borrow::Cow;
 
@@ -7,53 +7,54 @@ use crate::colour::{ColourTag, Gamma};
 /// The first eight bytes of every PNG file.
 pub(super) const SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
 
-/// The facts of a PNG file that decide how its samples are read (PNG specification, third edition).
+/// Facts of a PNG file that decide how it is decoded (PNG specification, third edition).
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(super) struct PngOutline<'a> {
-    /// The EXIF data, a TIFF structure; `None` if there are none.
+pub(super) struct PngProperties<'a> {
+    /// EXIF data (a TIFF structure), if the file has any.
     pub(super) exif: Option<&'a [u8]>,
-    /// The number of pictures of an animation; 0 if the file is no animation.
+    /// Number of frames of an animation; 0 without animation.
     pub(super) frames: usize,
-    /// The number of bits of a sample.
+    /// Bits per sample.
     pub(super) bits: u8,
-    /// The colour information that counts.
+    /// The colour information with the highest priority.
     pub(super) colour: ColourTag,
 }
 
 /// Fault in the chunks of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum PngFault {
-    /// The file ends before the last chunk does.
+    /// The file is truncated.
     Cut,
+    /// A checksum is wrong.
     Checksum,
 }
 
-impl<'a> PngOutline<'a> {
-    /// Reads the chunks one after another; a truncated file is read up to its end.
+impl<'a> PngProperties<'a> {
+    /// Reads the chunks in order, up to the end of a truncated file.
     pub(super) fn parse(file: &'a [u8]) -> Self {
-        let mut outline = Self::default();
+        let mut properties = Self::default();
         let mut colour = ColourChunks::default();
         for Chunk { kind, data, .. } in Chunks::new(file) {
             match kind {
-                b"IHDR" => outline.bits = data.get(8).copied().unwrap_or(0),
-                b"IDAT" => colour.is_closed = true,
-                b"eXIf" if outline.exif.is_none() => outline.exif = Some(data),
+                b"IHDR" => properties.bits = data.get(8).copied().unwrap_or(0),
+                b"IDAT" => colour.has_samples = true,
+                b"eXIf" if properties.exif.is_none() => properties.exif = Some(data),
                 b"acTL" => {
                     let frames = data.first_chunk::<4>();
-                    outline.frames = frames.map_or(0, |n| u32::from_be_bytes(*n) as usize);
+                    properties.frames = frames.map_or(0, |n| u32::from_be_bytes(*n) as usize);
                 }
                 _ => colour.add(*kind, data),
             }
         }
-        outline.colour = colour.tag();
-        outline
+        properties.colour = colour.tag();
+        properties
     }
 }
 
-/// The chunks of colour information. Those behind the samples do not count.
+/// Colour information from the chunks before the samples; later chunks are ignored.
 #[derive(Default)]
 struct ColourChunks<'a> {
-    is_closed: bool,
+    has_samples: bool,
     code_points: Option<[u8; 4]>,
     profile: Option<&'a [u8]>,
     is_srgb: bool,
@@ -62,7 +63,7 @@ struct ColourChunks<'a> {
 
 impl<'a> ColourChunks<'a> {
     fn add(&mut self, kind: [u8; 4], data: &'a [u8]) {
-        if self.is_closed {
+        if self.has_samples {
             return;
         }
         let four = data.first_chunk::<4>();
@@ -84,7 +85,7 @@ impl<'a> ColourChunks<'a> {
         }
     }
 
-    /// The first of them in the order in which they count.
+    /// The colour information with the highest priority.
     fn tag(self) -> ColourTag {
         match (self.code_points, self.profile) {
             (Some(points), _) => ColourTag::CodePoints(points),
@@ -96,26 +97,26 @@ impl<'a> ColourChunks<'a> {
     }
 }
 
-/// The file without chunks that decide no samples. The decoder would decompress profiles and texts, to any size.
-pub(super) fn samples_alone(file: &[u8]) -> Cow<'_, [u8]> {
+/// The file without chunks that do not affect the samples, because the decoder would decompress profiles and texts of any size.
+pub(super) fn without_metadata(file: &[u8]) -> Cow<'_, [u8]> {
     const NEEDED: [&[u8; 4]; 5] = [b"IHDR", b"PLTE", b"tRNS", b"IDAT", b"IEND"];
     let mut chunks = Chunks::new(file);
     if chunks.by_ref().all(|chunk| NEEDED.contains(&chunk.kind)) {
         return Cow::Borrowed(file);
     }
-    let mut alone = SIGNATURE.to_vec();
+    let mut reduced = SIGNATURE.to_vec();
     let mut chunks = Chunks::new(file);
     for chunk in chunks.by_ref().filter(|chunk| NEEDED.contains(&chunk.kind)) {
-        alone.extend((chunk.data.len() as u32).to_be_bytes());
-        alone.extend(chunk.body);
-        alone.extend(chunk.checksum.to_be_bytes());
+        reduced.extend((chunk.data.len() as u32).to_be_bytes());
+        reduced.extend(chunk.body);
+        reduced.extend(chunk.checksum.to_be_bytes());
     }
-    // The rest of a cut file: a part of its last chunk.
-    alone.extend(chunks.0);
-    Cow::Owned(alone)
+    // A truncated file keeps the part of its last chunk.
+    reduced.extend(chunks.0);
+    Cow::Owned(reduced)
 }
 
-/// The first fault in the chunks of a PNG file, up to the last chunk, `IEND`; `None` if there is none.
+/// The first fault in the chunks of a PNG file up to the last chunk, `IEND`; `None` without a fault.
 pub(super) fn fault(file: &[u8]) -> Option<PngFault> {
     for chunk in Chunks::new(file) {
         if crc32fast::hash(chunk.body) != chunk.checksum {
@@ -132,12 +133,12 @@ pub(super) fn fault(file: &[u8]) -> Option<PngFault> {
 struct Chunk<'a> {
     kind: &'a [u8; 4],
     data: &'a [u8],
-    /// Kind and data, the bytes that the checksum covers.
+    /// Kind and data, which the checksum covers.
     body: &'a [u8],
     checksum: u32,
 }
 
-/// The chunks of a file, up to the point where it breaks off.
+/// Iterator over the complete chunks of a file.
 struct Chunks<'a>(&'a [u8]);
 
 impl<'a> Chunks<'a> {

@@ -2,7 +2,7 @@ use image::{GrayImage, ImageFormat, RgbImage, RgbaImage};
 
 use super::*;
 
-fn encoded(bytes: Vec<u8>, place: impl Into<String>) -> ImageFile {
+fn image_file(bytes: Vec<u8>, place: impl Into<String>) -> ImageFile {
     ImageFile::new(bytes, place.into(), ReadingRule::default())
 }
 
@@ -11,7 +11,7 @@ fn png(image: &DynamicImage) -> ImageFile {
     image
         .write_to(&mut Cursor::new(&mut bytes), ImageFormat::Png)
         .unwrap();
-    encoded(bytes, "test.png")
+    image_file(bytes, "test.png")
 }
 
 #[test]
@@ -35,16 +35,16 @@ fn sixteen_bits_become_the_nearest_eight() {
 }
 
 #[test]
-fn what_cannot_be_shown_is_refused_by_name() {
-    let clear = png(&RgbaImage::from_raw(1, 1, vec![1, 2, 3, 9]).unwrap().into());
+fn unsupported_images_are_refused_by_name() {
+    let transparent = png(&RgbaImage::from_raw(1, 1, vec![1, 2, 3, 9]).unwrap().into());
     assert!(
-        clear
+        transparent
             .decode()
             .unwrap_err()
             .to_string()
             .contains("transparent")
     );
-    let text = encoded(b"no image".to_vec(), "a.png");
+    let text = image_file(b"no image".to_vec(), "a.png");
     assert!(
         text.check()
             .unwrap_err()
@@ -63,10 +63,10 @@ fn a_truncated_file_is_named() {
 }
 
 #[test]
-fn the_limit_on_pixels_can_be_moved() {
+fn the_pixel_limit_can_be_changed() {
     let mut picture = png(&GrayImage::new(64, 64).into());
     picture.decode().unwrap();
-    picture.rule.most_pixels = 4095;
+    picture.rule.max_pixels = 4095;
     let error = picture.decode().unwrap_err().to_string();
     assert!(
         error.contains("64 × 64 pixels") && error.contains("--decode max-pixels"),
@@ -74,10 +74,10 @@ fn the_limit_on_pixels_can_be_moved() {
     );
 }
 
-/// The error for bytes that are not a complete picture. It is one line and begins with the file.
-fn fault(bytes: Vec<u8>) -> String {
+/// The error for bytes that are not a complete image; one line that begins with the file name.
+fn decoding_error(bytes: Vec<u8>) -> String {
     let place = "a.png";
-    let error = encoded(bytes, place).decode().unwrap_err();
+    let error = image_file(bytes, place).decode().unwrap_err();
     let error = error.to_string();
     assert!(error.starts_with("a.png: "), "{error}");
     assert_eq!(error.lines().count(), 1, "{error}");
@@ -93,18 +93,21 @@ fn a_corrupt_png_is_named() {
     for at in [data, data + 40, end - 5] {
         let mut flipped = bytes.clone();
         flipped[at] ^= 0x10;
-        assert!(fault(flipped).contains("not a "), "data at {at}");
+        assert!(decoding_error(flipped).contains("not a "), "data at {at}");
     }
     for at in end - 4..end {
         let mut flipped = bytes.clone();
         flipped[at] ^= 1;
-        assert!(fault(flipped).contains("checksum"), "checksum at {at}");
+        assert!(
+            decoding_error(flipped).contains("checksum"),
+            "checksum at {at}"
+        );
     }
     for length in [data + 9, end - 4, end, end + 4, end + 8, end + 11] {
-        let cut = fault(bytes[..length].to_vec());
+        let cut = decoding_error(bytes[..length].to_vec());
         assert!(cut.contains("not a whole image"), "{length}: {cut}");
     }
-    assert!(encoded(bytes, "").decode().is_ok());
+    assert!(image_file(bytes, "").decode().is_ok());
 }
 
 fn jpeg(color: jpeg_encoder::ColorType, channels: usize) -> Vec<u8> {
@@ -116,8 +119,8 @@ fn jpeg(color: jpeg_encoder::ColorType, channels: usize) -> Vec<u8> {
     bytes
 }
 
-/// A JPEG of one colour in four inks, 32 × 32 pixels.
-fn inked(color: jpeg_encoder::ColorType, inks: [u8; 4], profile: Option<&[u8]>) -> Vec<u8> {
+/// A CMYK JPEG of one colour, 32 × 32 pixels.
+fn cmyk_jpeg(color: jpeg_encoder::ColorType, inks: [u8; 4], profile: Option<&[u8]>) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = jpeg_encoder::Encoder::new(&mut bytes, 100);
     if let Some(profile) = profile {
@@ -129,6 +132,7 @@ fn inked(color: jpeg_encoder::ColorType, inks: [u8; 4], profile: Option<&[u8]>) 
     bytes
 }
 
+/// Asserts that all pixels are within 3 codes of `expected`.
 fn assert_near(file: &ImageFile, expected: [u8; 3]) {
     let rgb = file.decode().unwrap();
     assert_eq!((rgb.width(), rgb.height()), (32, 32));
@@ -151,7 +155,7 @@ fn inks_become_rgb_with_a_note() {
             ([255, 0, 0, 0], [0, 255, 255]),
             ([40, 90, 200, 60], [164, 126, 42]),
         ] {
-            let file = encoded(inked(color, inks, None), "a.jpg");
+            let file = image_file(cmyk_jpeg(color, inks, None), "a.jpg");
             assert_near(&file, expected);
             assert_eq!(file.check().unwrap(), (32, 32));
             let note = file.note().colour.unwrap();
@@ -162,26 +166,26 @@ fn inks_become_rgb_with_a_note() {
 }
 
 #[test]
-fn inks_without_the_marker_of_adobe_are_not_inverted() {
-    let mut bytes = inked(jpeg_encoder::ColorType::Cmyk, [0, 0, 0, 255], None);
+fn inks_without_the_adobe_marker_are_not_inverted() {
+    let mut bytes = cmyk_jpeg(jpeg_encoder::ColorType::Cmyk, [0, 0, 0, 255], None);
     let marker = bytes.windows(5).position(|five| five == b"Adobe").unwrap();
     bytes[marker] = b'a';
-    // Black, inverted, is full cyan, magenta and yellow; both are black. White would tell them apart.
-    assert_near(&encoded(bytes, "a.jpg"), [0, 0, 0]);
-    let mut bytes = inked(jpeg_encoder::ColorType::Cmyk, [255, 255, 255, 255], None);
+    // Inverted black is full cyan, magenta and yellow, which is black too; the second image tells them apart.
+    assert_near(&image_file(bytes, "a.jpg"), [0, 0, 0]);
+    let mut bytes = cmyk_jpeg(jpeg_encoder::ColorType::Cmyk, [255, 255, 255, 255], None);
     bytes[marker] = b'a';
-    assert_near(&encoded(bytes, "a.jpg"), [255, 255, 255]);
+    assert_near(&image_file(bytes, "a.jpg"), [255, 255, 255]);
 }
 
 #[test]
-fn a_broken_profile_of_inks_is_named_and_can_be_ignored() {
-    let file = inked(jpeg_encoder::ColorType::Cmyk, [0; 4], Some(b"no profile"));
-    let problem = fault(file.clone());
+fn a_broken_cmyk_profile_is_named_and_can_be_ignored() {
+    let file = cmyk_jpeg(jpeg_encoder::ColorType::Cmyk, [0; 4], Some(b"no profile"));
+    let problem = decoding_error(file.clone());
     assert!(
         problem.contains("ICC profile") && problem.contains("--decode colour=ignore"),
         "{problem}"
     );
-    let mut file = encoded(file, "a.jpg");
+    let mut file = image_file(file, "a.jpg");
     file.rule.colour = ColourRule::Ignore;
     assert_near(&file, [255, 255, 255]);
 }
@@ -193,7 +197,7 @@ fn grey_and_rgb_files_have_no_inks() {
         (jpeg_encoder::ColorType::Luma, 1),
     ] {
         let (bytes, place) = (jpeg(color, channels), String::new());
-        let file = encoded(bytes, place);
+        let file = image_file(bytes, place);
         assert!(file.decode().is_ok() && file.note().colour.is_none());
     }
 }
@@ -202,13 +206,13 @@ fn grey_and_rgb_files_have_no_inks() {
 fn a_truncated_jpeg_is_named() {
     let bytes = jpeg(jpeg_encoder::ColorType::Rgb, 3);
     for length in [bytes.len() / 2, bytes.len() - 40, bytes.len() - 2] {
-        let cut = fault(bytes[..length].to_vec());
+        let cut = decoding_error(bytes[..length].to_vec());
         assert!(cut.contains("not a "), "{length}: {cut}");
     }
 }
 
 #[test]
-fn a_bomb_is_refused_before_it_is_decompressed() {
+fn a_decompression_bomb_is_refused() {
     let mut bomb = png(&GrayImage::new(1, 1).into());
     bomb.bytes[16..24].copy_from_slice(&[0, 1, 0, 0, 0, 1, 0, 0]);
     assert!(bomb.check().is_err());

@@ -65,39 +65,40 @@ pub(super) struct TiffProperties<'a> {
 impl<'a> TiffProperties<'a> {
     /// Parses the tags. Fields whose tags cannot be read have default values.
     pub(super) fn parse(file: &'a [u8]) -> Self {
-        let mut outline = Self::default();
+        let mut properties = Self::default();
         let Some((reader, first)) = Reader::open(file) else {
-            return outline;
+            return properties;
         };
         let Some((directory, mut next)) = reader.directory(first) else {
-            return outline;
+            return properties;
         };
         let value = |tag| reader.first_value(&directory, tag);
-        outline.pages = 1;
-        outline.orientation = value(ORIENTATION).unwrap_or(0);
-        outline.bits = value(BITS_PER_SAMPLE).unwrap_or(1);
-        outline.is_cmyk = value(PHOTOMETRIC) == Some(SEPARATED)
-            && outline.bits == 8
+        properties.pages = 1;
+        properties.orientation = value(ORIENTATION).unwrap_or(0);
+        properties.bits = value(BITS_PER_SAMPLE).unwrap_or(1);
+        properties.is_cmyk = value(PHOTOMETRIC) == Some(SEPARATED)
+            && properties.bits == 8
             && value(SAMPLES_PER_PIXEL) == Some(4)
             && value(INK_SET).is_none_or(|set| set == 1)
             && value(PLANAR_CONFIGURATION).is_none_or(|planes| planes == 1);
-        if !outline.is_cmyk {
-            outline.colours = unsupported_colours(value(PHOTOMETRIC));
+        if !properties.is_cmyk {
+            properties.colours = unsupported_colours(value(PHOTOMETRIC));
         }
-        outline.profile = reader.bytes(&directory, ICC_PROFILE);
+        properties.profile = reader.bytes(&directory, ICC_PROFILE);
         let is_preview = value(NEW_SUBFILE_TYPE).is_some_and(is_reduced);
-        outline.is_raw = is_preview || directory.iter().any(|entry| entry.tag == DNG_VERSION);
-        outline.is_float = value(SAMPLE_FORMAT) == Some(FLOAT);
+        properties.is_raw = is_preview || directory.iter().any(|entry| entry.tag == DNG_VERSION);
+        properties.is_float = value(SAMPLE_FORMAT) == Some(FLOAT);
         for (offsets, counts) in [
             (STRIP_OFFSETS, STRIP_BYTE_COUNTS),
             (TILE_OFFSETS, TILE_BYTE_COUNTS),
         ] {
-            let offsets = reader.values(&directory, offsets);
-            let counts = reader.values(&directory, counts);
-            let end = offsets
-                .zip(counts)
-                .map(|(offset, count)| offset.saturating_add(count));
-            outline.end = outline.end.max(end.max().unwrap_or(0));
+            let end = reader
+                .values(&directory, offsets)
+                .zip(reader.values(&directory, counts))
+                .map(|(offset, count)| offset.saturating_add(count))
+                .max()
+                .unwrap_or(0);
+            properties.end = properties.end.max(end);
         }
         let mut visited = BTreeSet::from([first]);
         while visited.len() < MAX_PAGES
@@ -105,10 +106,10 @@ impl<'a> TiffProperties<'a> {
             && let Some((directory, following)) = reader.directory(next)
         {
             let kind = reader.first_value(&directory, NEW_SUBFILE_TYPE);
-            outline.pages += usize::from(!kind.is_some_and(is_no_page));
+            properties.pages += usize::from(!kind.is_some_and(is_copy_or_mask));
             next = following;
         }
-        outline
+        properties
     }
 }
 
@@ -118,7 +119,7 @@ fn is_reduced(subfile_type: u64) -> bool {
 }
 
 /// True if the subfile type marks a copy of reduced resolution or a transparency mask of another image.
-fn is_no_page(subfile_type: u64) -> bool {
+fn is_copy_or_mask(subfile_type: u64) -> bool {
     subfile_type & 0b101 != 0
 }
 
@@ -176,11 +177,13 @@ impl<'a> Reader<'a> {
     fn read_uint(&self, offset: u64, size: usize) -> Option<u64> {
         let start = usize::try_from(offset).ok()?;
         let bytes = self.file.get(start..start.checked_add(size)?)?;
-        let append = |number: u64, byte: &u8| number << 8 | u64::from(*byte);
+        let mut padded = [0; 8];
         Some(if self.is_big_endian {
-            bytes.iter().fold(0, append)
+            padded[8 - size..].copy_from_slice(bytes);
+            u64::from_be_bytes(padded)
         } else {
-            bytes.iter().rev().fold(0, append)
+            padded[..size].copy_from_slice(bytes);
+            u64::from_le_bytes(padded)
         })
     }
 
@@ -194,14 +197,14 @@ impl<'a> Reader<'a> {
         let entry_size = 4 + 2 * offset_size as u64;
         let count = count.min(MAX_ENTRIES);
         let mut entries = Vec::new();
-        let mut place = at.checked_add(count_size as u64)?;
+        let mut entry = at.checked_add(count_size as u64)?;
         for _ in 0..count {
             let (tag, value_type) = (
-                self.read_uint(place, 2)? as u16,
-                self.read_uint(place + 2, 2)? as u16,
+                self.read_uint(entry, 2)? as u16,
+                self.read_uint(entry + 2, 2)? as u16,
             );
-            let count = self.read_uint(place + 4, offset_size)?;
-            let inline = place + 4 + offset_size as u64;
+            let count = self.read_uint(entry + 4, offset_size)?;
+            let inline = entry + 4 + offset_size as u64;
             let length = count.saturating_mul(size_of_type(value_type));
             let offset = if length <= offset_size as u64 {
                 inline
@@ -214,9 +217,9 @@ impl<'a> Reader<'a> {
                 count,
                 offset,
             });
-            place = place.checked_add(entry_size)?;
+            entry = entry.checked_add(entry_size)?;
         }
-        Some((entries, self.read_uint(place, offset_size).unwrap_or(0)))
+        Some((entries, self.read_uint(entry, offset_size).unwrap_or(0)))
     }
 
     /// Returns the bytes of a tag; `None` if the directory lacks it or the file ends too early.
@@ -244,7 +247,7 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// Size in bytes of one value of an unsigned integer type. Every other type has 1 here.
+/// Size in bytes of one value of an unsigned integer type; 1 for every other type.
 fn size_of_type(value_type: u16) -> u64 {
     match value_type {
         3 => 2,
@@ -258,14 +261,14 @@ fn size_of_type(value_type: u16) -> u64 {
 mod tests {
     use super::*;
 
-    /// Bytes of a directory with a subfile type alone.
-    const DIRECTORY: u32 = 18;
+    /// Size of a directory with only a subfile type, in bytes.
+    const DIRECTORY_SIZE: u32 = 18;
 
     /// A TIFF file whose directories have these subfile types and indexes of their next directory.
     fn file(directories: &[(u32, Option<u32>)]) -> Vec<u8> {
         let mut file = [&b"II*\0"[..], &8_u32.to_le_bytes()].concat();
         for (subfile_type, next) in directories {
-            let next = next.map_or(0, |index| 8 + index * DIRECTORY);
+            let next = next.map_or(0, |index| 8 + index * DIRECTORY_SIZE);
             for number in [1_u16, NEW_SUBFILE_TYPE, 4] {
                 file.extend(number.to_le_bytes());
             }
@@ -277,7 +280,7 @@ mod tests {
     }
 
     #[test]
-    fn a_circle_of_directories_ends() {
+    fn parsing_ends_for_cyclic_directories() {
         let circle = file(&[(0, Some(1)), (0, Some(2)), (0, Some(1))]);
         assert_eq!(TiffProperties::parse(&circle).pages, 3);
     }

@@ -1,48 +1,47 @@
-//! The facts of a WebP file in its chunks: [`WebpOutline`]; and whether it was cut: [`missing`].
+//! Facts of a WebP file from its chunks: [`WebpProperties`], and the length in its header: [`stated_length`].
 
-/// The facts of a WebP file that decide how it is read (WebP container specification; RFC 9649, section 2).
+/// Facts of a WebP file that decide how it is decoded (WebP container specification; RFC 9649, section 2).
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub(super) struct WebpOutline<'a> {
-    /// The EXIF data, a TIFF structure; `None` if there are none.
+pub(super) struct WebpProperties<'a> {
+    /// EXIF data (a TIFF structure), if the file has any.
     pub(super) exif: Option<&'a [u8]>,
-    /// The ICC profile; `None` if there is none.
+    /// ICC profile, if the file has one.
     pub(super) profile: Option<&'a [u8]>,
-    /// The number of pictures of an animation; 0 if the file is no animation.
+    /// Number of frames of an animation; 0 without animation.
     pub(super) frames: usize,
 }
 
-impl<'a> WebpOutline<'a> {
-    /// Reads the chunks one after another; a truncated file is read up to its end.
+impl<'a> WebpProperties<'a> {
+    /// Reads the chunks in order, up to the end of a truncated file.
     pub(super) fn parse(file: &'a [u8]) -> Self {
-        let mut outline = Self::default();
+        let mut properties = Self::default();
         for (kind, data) in Chunks::new(file) {
             match kind {
-                b"ICCP" if outline.profile.is_none() => outline.profile = Some(data),
-                b"ANMF" => outline.frames += 1,
-                b"EXIF" if outline.exif.is_none() => {
-                    // Some programs write the header of a JPEG segment, too.
-                    outline.exif = Some(data.strip_prefix(b"Exif\0\0").unwrap_or(data));
+                b"ICCP" if properties.profile.is_none() => properties.profile = Some(data),
+                b"ANMF" => properties.frames += 1,
+                b"EXIF" if properties.exif.is_none() => {
+                    // Some programs also write the header of a JPEG segment.
+                    properties.exif = Some(data.strip_prefix(b"Exif\0\0").unwrap_or(data));
                 }
                 _ => {}
             }
         }
-        outline
+        properties
     }
 }
 
-/// The number of bytes that a file must have by its header; `None` if it has them.
-pub(super) fn missing(file: &[u8]) -> Option<u64> {
+/// The length of the file that its header states, in bytes; `None` if the header is truncated.
+pub(super) fn stated_length(file: &[u8]) -> Option<u64> {
     let size = file.get(4..8).and_then(|size| size.try_into().ok())?;
-    let whole = u64::from(u32::from_le_bytes(size)) + 8;
-    (whole > file.len() as u64).then_some(whole)
+    Some(u64::from(u32::from_le_bytes(size)) + 8)
 }
 
-/// The chunks of a file, up to the point where it breaks off.
+/// Iterator over the complete chunks of a file.
 struct Chunks<'a>(&'a [u8]);
 
 impl<'a> Chunks<'a> {
     fn new(file: &'a [u8]) -> Self {
-        // RIFF, the size, WEBP.
+        // The header has 12 bytes: RIFF, the size, WEBP.
         Self(file.get(12..).unwrap_or_default())
     }
 }
@@ -55,7 +54,7 @@ impl<'a> Iterator for Chunks<'a> {
         let (length, rest) = rest.split_first_chunk::<4>()?;
         let length = u32::from_le_bytes(*length) as usize;
         let (data, rest) = rest.split_at_checked(length)?;
-        // A chunk of odd length is filled up by one byte.
+        // A chunk of odd length is padded by one byte.
         self.0 = rest.get(length % 2..).unwrap_or_default();
         Some((kind, data))
     }

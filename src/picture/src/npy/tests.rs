@@ -72,11 +72,11 @@ fn every_integer_is_read() {
 }
 
 #[test]
-fn the_error_names_why_an_array_is_refused() {
+fn errors_name_the_unsupported_property() {
     let fortran = "{'descr': '|u1', 'fortran_order': True, 'shape': (1, 1), }\n";
     let twice_open = "{'descr': '|u1', 'fortran_order': False, 'shape': (1, 1)} }\n";
     let record = "{'descr': [('x', '<f4')], 'fortran_order': False, 'shape': (1, 1), }\n";
-    for (bytes, says) in [
+    for (bytes, expected) in [
         (b"\x89PNG".to_vec(), "not a .npy file"),
         (file(1, fortran, &[1]), "Fortran order"),
         (file(1, record, &[0; 4]), "its header is not"),
@@ -99,7 +99,7 @@ fn the_error_names_why_an_array_is_refused() {
         (array("|u1", "(2, 2)", &[0; 5]), "not a whole"),
     ] {
         let problem = Npy::parse(&bytes).unwrap_err();
-        assert!(problem.contains(says), "{says}: {problem}");
+        assert!(problem.contains(expected), "{expected}: {problem}");
     }
 }
 

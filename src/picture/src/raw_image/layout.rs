@@ -1,4 +1,4 @@
-//! The arrangement of samples in a raw image: [`Layout`].
+//! Arrangement of the samples in a raw image: [`Layout`].
 
 /// Arrangement of the samples of a pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -8,7 +8,7 @@ pub(super) struct Layout {
     pub(super) order: Order,
 }
 
-/// Size of a sample.
+/// Bit depth of a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Depth {
     Eight,
@@ -18,14 +18,14 @@ pub(super) enum Depth {
 /// Meaning of the channels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Order {
-    /// The channels that are red, green and blue.
+    /// Indices of the red, green and blue channels.
     Channels([usize; 3]),
-    /// One channel under a mosaic of filters; row and column (0 or 1) of the first red site.
+    /// One channel behind a Bayer mosaic, with row and column (0 or 1) of the first red site.
     Mosaic([usize; 2]),
 }
 
 impl Depth {
-    /// Bytes of a sample.
+    /// Size of a sample, in bytes.
     pub(super) fn bytes(self) -> usize {
         match self {
             Self::Eight => 1,
@@ -35,12 +35,11 @@ impl Depth {
 }
 
 impl Layout {
-    /// The layout of an encoding by its name in ROS or Foxglove. `8UC3` and `8UC4` have the order of OpenCV.
+    /// The layout of an encoding, by its name in ROS or Foxglove. `8UC3` and `8UC4` have the channel order of OpenCV (BGR).
     ///
     /// # Errors
-    /// If the encoding is unknown, or has numbers that are not colours.
-    pub(super) fn named(encoding: &str) -> Result<Self, String> {
-        let grey = (1, Order::Channels([0; 3]));
+    /// If the encoding is unknown, or its numbers are not colours.
+    pub(super) fn from_encoding(encoding: &str) -> Result<Self, String> {
         let (rgb, bgr) = (Order::Channels([0, 1, 2]), Order::Channels([2, 1, 0]));
         let (name, depth) = match encoding {
             "8UC1" => ("mono", Depth::Eight),
@@ -53,7 +52,7 @@ impl Layout {
             },
         };
         let (channels, order) = match name {
-            "mono" => grey,
+            "mono" => (1, Order::Channels([0; 3])),
             "rgb" => (3, rgb),
             "bgr" => (3, bgr),
             "rgba" => (4, rgb),

@@ -1,7 +1,6 @@
-//! Interpolation of a mosaic of colour filters: [`demosaic`].
+//! Demosaicing of integer codes, for all four Bayer patterns: [`demosaic`].
 //!
-//! The synthesis of `light` interpolates linear light in lanes of floats, from a mosaic that begins with red. Here codes of a camera
-//! are interpolated, in whole numbers, from any of the four mosaics.
+//! The crate `light` has another implementation, for linear light in floats, for patterns that begin with red.
 
 use darkqa_ground::types::Sample;
 
@@ -11,8 +10,8 @@ pub(super) trait RawSample: Sample + Into<u32> + TryFrom<u32> {}
 impl RawSample for u8 {}
 impl RawSample for u16 {}
 
-/// Appends the RGB samples of a mosaic. A colour that a site lacks is the rounded mean of the two or four nearest sites of that colour;
-/// beyond an edge, rows and columns are mirrored. `red` is the row and column (0 or 1) of the first red site.
+/// Appends the RGB samples of a Bayer mosaic. A missing colour of a site is the rounded mean of the two or four nearest sites with that
+/// colour; beyond an edge, rows and columns are mirrored. `red` is the row and column (0 or 1) of the first red site.
 pub(super) fn demosaic<T: RawSample>(
     sites: &[T],
     width: usize,
@@ -21,21 +20,21 @@ pub(super) fn demosaic<T: RawSample>(
 ) {
     let height = sites.len() / width;
     for y in 0..height {
-        let [above, below] = around(y, height).map(|row| &sites[row * width..][..width]);
+        let [above, below] = neighbours(y, height).map(|row| &sites[row * width..][..width]);
         let here = &sites[y * width..][..width];
         for x in 0..width {
-            let [left, right] = around(x, width);
+            let [left, right] = neighbours(x, width);
             let site = here[x];
-            let cross = || mean([above[x], below[x], here[left], here[right]]);
-            let corners = || mean([above[left], above[right], below[left], below[right]]);
-            // Each of two neighbours counts twice, so that all means are of four.
-            let beside = || mean([here[left], here[left], here[right], here[right]]);
-            let over = || mean([above[x], above[x], below[x], below[x]]);
+            let cross = [above[x], below[x], here[left], here[right]];
+            let corners = [above[left], above[right], below[left], below[right]];
+            // Two neighbours are repeated, so that every mean is of four samples.
+            let horizontal = [here[left], here[left], here[right], here[right]];
+            let vertical = [above[x], above[x], below[x], below[x]];
             samples.extend_from_slice(&match (y % 2 == red[0], x % 2 == red[1]) {
-                (true, true) => [site, cross(), corners()],
-                (false, false) => [corners(), cross(), site],
-                (true, false) => [beside(), site, over()],
-                (false, true) => [over(), site, beside()],
+                (true, true) => [site, mean(cross), mean(corners)],
+                (false, false) => [mean(corners), mean(cross), site],
+                (true, false) => [mean(horizontal), site, mean(vertical)],
+                (false, true) => [mean(vertical), site, mean(horizontal)],
             });
         }
     }
@@ -47,8 +46,8 @@ fn mean<T: RawSample>(sites: [T; 4]) -> T {
     T::try_from((sum + 2) / 4).unwrap_or_default()
 }
 
-/// The indexes before and after `i` among `count`, mirrored at the edges so that they keep their parity.
-fn around(i: usize, count: usize) -> [usize; 2] {
+/// The indices before and after `i` below `count`, mirrored at the edges so that they keep their parity.
+fn neighbours(i: usize, count: usize) -> [usize; 2] {
     let last = count - 1;
     let before = if i == 0 { 1.min(last) } else { i - 1 };
     let after = if i == last {
@@ -65,7 +64,7 @@ mod tests {
 
     const PATTERNS: [[usize; 2]; 4] = [[0, 0], [0, 1], [1, 0], [1, 1]];
 
-    /// Channel of a site.
+    /// The colour channel of a site: 0 red, 1 green, 2 blue.
     fn channel(y: usize, x: usize, red: [usize; 2]) -> usize {
         match (y % 2 == red[0], x % 2 == red[1]) {
             (true, true) => 0,
@@ -74,6 +73,7 @@ mod tests {
         }
     }
 
+    /// A mosaic with the values `value(row, column, channel)`.
     fn mosaic(
         width: usize,
         height: usize,
@@ -100,7 +100,7 @@ mod tests {
         }
     }
 
-    /// Inside, each channel of a pixel is the mean of the nearest sites of that colour.
+    /// Away from the edges, each channel of a pixel is the mean of the nearest sites with that colour.
     #[test]
     fn pixels_are_means_of_their_neighbours() {
         let (width, height) = (9, 7);
@@ -112,15 +112,20 @@ mod tests {
             demosaic(&sites, width, red, &mut samples);
             for (y, x) in (1..height - 1).flat_map(|y| (1..width - 1).map(move |x| (y, x))) {
                 for colour in 0..3 {
-                    let near = |distance: usize| -> Vec<u32> {
-                        let all =
-                            (y - 1..=y + 1).flat_map(|j| (x - 1..=x + 1).map(move |i| (j, i)));
-                        all.filter(|&(j, i)| j.abs_diff(y) + i.abs_diff(x) == distance)
-                            .filter(|&(j, i)| channel(j, i, red) == colour)
-                            .map(|(j, i)| u32::from(sites[j * width + i]))
-                            .collect()
-                    };
-                    let nearest = (0..3).map(near).find(|sites| !sites.is_empty()).unwrap();
+                    let of_colour: Vec<(usize, u32)> = (y - 1..=y + 1)
+                        .flat_map(|j| (x - 1..=x + 1).map(move |i| (j, i)))
+                        .filter(|&(j, i)| channel(j, i, red) == colour)
+                        .map(|(j, i)| {
+                            let distance = j.abs_diff(y) + i.abs_diff(x);
+                            (distance, u32::from(sites[j * width + i]))
+                        })
+                        .collect();
+                    let least = of_colour.iter().map(|(distance, _)| *distance).min();
+                    let nearest: Vec<u32> = of_colour
+                        .into_iter()
+                        .filter(|(distance, _)| Some(*distance) == least)
+                        .map(|(_, value)| value)
+                        .collect();
                     let count = nearest.len() as u32;
                     let expected = (nearest.iter().sum::<u32>() + count / 2) / count;
                     let found = samples[(y * width + x) * 3 + colour];
@@ -131,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn one_row_or_column_is_no_panic() {
+    fn a_single_row_or_column_does_not_panic() {
         for red in PATTERNS {
             for width in [1, 4] {
                 let mut samples = Vec::new();

@@ -1,10 +1,10 @@
 use proptest::prelude::*;
 
-use super::super::reading_rule::MOST_PIXELS;
+use super::super::reading_rule::MAX_PIXELS;
 use super::*;
 
-/// A PNG file with the given packed rows.
-fn png((height, width): (u32, u32), color: ColorType, bits: BitDepth, data: &[u8]) -> Vec<u8> {
+/// A PNG file with these packed rows.
+fn png([height, width]: [u32; 2], color: ColorType, bits: BitDepth, data: &[u8]) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, width, height);
     encoder.set_color(color);
@@ -20,7 +20,7 @@ fn png((height, width): (u32, u32), color: ColorType, bits: BitDepth, data: &[u8
 }
 
 fn read(bytes: &[u8], forms: &[SampleForm]) -> Result<Vec<u16>, String> {
-    RawPng::open(bytes, forms, MOST_PIXELS)?.samples(|sample| sample)
+    RawPng::open(bytes, forms, MAX_PIXELS)?.samples(|sample| sample)
 }
 
 #[test]
@@ -47,7 +47,7 @@ fn palette_indices_stay_indices() {
             [0, 1, 1, 1, 0, 1],
         ),
     ] {
-        let bytes = png((2, 3), ColorType::Indexed, bits, &data);
+        let bytes = png([2, 3], ColorType::Indexed, bits, &data);
         assert_eq!(
             read(&bytes, &[SampleForm::Palette]).unwrap(),
             expected,
@@ -57,11 +57,11 @@ fn palette_indices_stay_indices() {
 }
 
 #[test]
-fn grey_is_read_as_it_is() {
-    let shallow = png((1, 2), ColorType::Grayscale, BitDepth::Eight, &[40, 255]);
+fn grey_samples_are_not_scaled() {
+    let shallow = png([1, 2], ColorType::Grayscale, BitDepth::Eight, &[40, 255]);
     assert_eq!(read(&shallow, &[SampleForm::Grey8]).unwrap(), [40, 255]);
     let deep = png(
-        (2, 1),
+        [2, 1],
         ColorType::Grayscale,
         BitDepth::Sixteen,
         &[1, 2, 255, 255],
@@ -77,7 +77,7 @@ fn other_forms_are_refused_by_name() {
         [SampleForm::Grey8, SampleForm::Grey16, SampleForm::Palette],
         [SampleForm::Grey16],
     );
-    for (color, bits, size, forms, says) in [
+    for (color, bits, size, forms, expected) in [
         (
             ColorType::Rgb,
             BitDepth::Eight,
@@ -121,8 +121,8 @@ fn other_forms_are_refused_by_name() {
             "a palette PNG of 8 bits; 16-bit grey expected",
         ),
     ] {
-        let problem = read(&png((1, 1), color, bits, &vec![0; size]), forms).unwrap_err();
-        assert!(problem.contains(says), "{problem}");
+        let problem = read(&png([1, 1], color, bits, &vec![0; size]), forms).unwrap_err();
+        assert!(problem.contains(expected), "{problem}");
     }
     let problem = read(b"\xff\xd8\xff\xe0", &deep).unwrap_err();
     assert!(problem.starts_with("not a readable PNG"), "{problem}");
@@ -130,7 +130,7 @@ fn other_forms_are_refused_by_name() {
 
 #[test]
 fn a_bomb_is_refused_before_it_is_decompressed() {
-    let mut bytes = png((1, 1), ColorType::Grayscale, BitDepth::Sixteen, &[0, 0]);
+    let mut bytes = png([1, 1], ColorType::Grayscale, BitDepth::Sixteen, &[0, 0]);
     bytes[16..24].copy_from_slice(&[0, 1, 0, 0, 0, 1, 0, 0]);
     seal(&mut bytes);
     let problem = read(&bytes, &[SampleForm::Grey16]).unwrap_err();
@@ -140,24 +140,21 @@ fn a_bomb_is_refused_before_it_is_decompressed() {
     );
 }
 
-/// Each cause of a refusal has its own error.
 #[test]
-fn refusals_have_causes() {
-    let deep = png((2, 1), ColorType::Grayscale, BitDepth::Sixteen, &[0; 4]);
-    let cause = |bytes: &[u8], form: SampleForm, most: u64| {
-        RawPng::open(bytes, &[form], most).map(|png| png.size)
-    };
-    assert_eq!(cause(&deep, SampleForm::Grey16, 2), Ok((2, 1)));
+fn each_cause_of_a_refusal_has_its_own_error() {
+    let deep = png([2, 1], ColorType::Grayscale, BitDepth::Sixteen, &[0; 4]);
+    let grey_16 = [SampleForm::Grey16];
+    assert!(RawPng::open(&deep, &grey_16, 2).is_ok_and(|png| png.size == (2, 1)));
     assert!(matches!(
-        cause(&deep[..30], SampleForm::Grey16, 2),
+        RawPng::open(&deep[..30], &grey_16, 2),
         Err(RawPngError::Broken(_))
     ));
     assert!(matches!(
-        cause(&deep, SampleForm::Grey16, 1),
+        RawPng::open(&deep, &grey_16, 1),
         Err(RawPngError::TooLarge(_))
     ));
     assert!(matches!(
-        cause(&deep, SampleForm::Grey8, 2),
+        RawPng::open(&deep, &[SampleForm::Grey8], 2),
         Err(RawPngError::OtherForm(_))
     ));
 }
@@ -179,7 +176,7 @@ fn crc32(bytes: &[u8]) -> u32 {
 proptest! {
     #[test]
     fn no_bytes_panic(at in 16_usize..90, value in any::<u8>(), end in 33_usize..100) {
-        let mut bytes = png((3, 5), ColorType::Indexed, BitDepth::Two, &[0x1b; 6]);
+        let mut bytes = png([3, 5], ColorType::Indexed, BitDepth::Two, &[0x1b; 6]);
         if let Some(byte) = bytes.get_mut(at) {
             *byte = value;
         }

@@ -8,7 +8,7 @@ use super::findings::{Findings, Mark};
 use crate::dataset::{Dataset, Picture, SkipBad};
 use crate::engine::dark_already::{DarkImages, advice};
 use crate::error::Result;
-use crate::images::frames::first_asked;
+use crate::images::frames::first_question_per_frame;
 use crate::images::progress::Progress;
 use crate::text::words::counted;
 use crate::types::{Digest, FrameId, InputNote, InputSummary, Question};
@@ -108,7 +108,7 @@ pub(super) fn check_images(
 /// The distinct frames that the questions show, in the order of the questions.
 fn shown_frames<'a>(dataset: &'a Dataset, questions: &'a [Question]) -> Vec<&'a FrameId> {
     let mut seen = HashSet::new();
-    first_asked(questions)
+    first_question_per_frame(questions)
         .into_iter()
         .flat_map(|question| dataset.shown_frames(&question.frame))
         .filter(|frame| seen.insert(*frame))

@@ -114,16 +114,10 @@ fn check_data(
     let bank = QuestionBank::open(&args.bank);
     let opened = bank.and_then(|bank| {
         if let Some(bank) = bank {
-            return bank.data(&place, set, rule, progress);
+            return bank.open_images(&place, set, rule, progress);
         }
         let rules = rules(selection.rules.as_deref())?;
-        open_data(
-            (&place, &args.scene, set),
-            selection,
-            &rules,
-            rule,
-            progress,
-        )
+        open_data(&place, &args.scene, set, selection, &rules, rule, progress)
     });
     let opened = opened.and_then(|dataset| Ok((dataset, args.scene.set_light(&place)?)));
     let (mut dataset, light) = match opened {

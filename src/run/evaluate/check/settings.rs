@@ -6,7 +6,7 @@ use super::super::settings::EvaluateArgs;
 use super::findings::Findings;
 use crate::ask::Prompts;
 use crate::error::Result;
-use crate::images::enhancement::enhancers::{self, EnhancerRunArgs, OpenEnhancers};
+use crate::images::enhancement::enhancers::{self, EnhancerModels, EnhancerRunArgs};
 use crate::images::trials::check_used;
 use crate::images::trials::questions::rules;
 use crate::types::Rgb;
@@ -61,7 +61,7 @@ fn add(findings: &mut Findings, result: Result<Option<String>>) {
 
 /// Loads the enhancers and enhances one image with each. A missing runtime is not installed.
 fn try_enhancers(args: &EvaluateArgs) -> Result<Option<String>> {
-    let files = enhancers::read(&args.job.enhancers.llie)?;
+    let files = enhancers::read_models(&args.job.enhancers.llie)?;
     if files.is_empty() {
         return Ok(None);
     }
@@ -73,7 +73,7 @@ fn try_enhancers(args: &EvaluateArgs) -> Result<Option<String>> {
     let version = search.open()?.version().to_owned();
     let mut loading: EnhancerRunArgs = args.job.loading.clone();
     loading.runtime.offline = true;
-    let mut enhancers = OpenEnhancers::load(files, &loading)?.take()?;
+    let mut enhancers = EnhancerModels::load(files, &loading)?.take()?;
     // A gradient, because an image of a single value has no structure.
     let samples = (0..64 * 64 * 3).map(|index| (index / 192) as u8);
     let image = Rgb::new(64, 64, samples.collect())?;

@@ -235,7 +235,7 @@ fn a_bomb_is_refused_before_it_is_decompressed() {
         );
     }
     let rule = ReadingRule {
-        most_pixels: 27,
+        max_pixels: 27,
         ..ReadingRule::default()
     };
     let limited = |bytes| ImageFile::new(bytes, "a file".to_owned(), rule).check();

@@ -222,7 +222,7 @@ fn what_is_no_light_is_refused_by_name() {
         assert!(error.to_string().contains("not a"), "{length}: {error}");
     }
     let rule = ReadingRule {
-        most_pixels: 48 * 32 - 1,
+        max_pixels: 48 * 32 - 1,
         ..ReadingRule::default()
     };
     let error = ImageFile::new(whole, "a file".to_owned(), rule).decode();

@@ -31,7 +31,7 @@ fn fits_give_the_calibrated_medians() {
 }
 
 #[test]
-fn measurements_are_those_of_the_nearest_step() {
+fn the_nearest_step_is_used() {
     for (gain, step) in [
         (0.01, 0),
         (0.1, 0),
@@ -56,15 +56,17 @@ fn measurements_are_those_of_the_nearest_step() {
     assert!((first.bias[0] - 0.60525787).abs() < 1e-15);
 }
 
-/// A file with a gain in each step: the nearest in ln K is taken, and steps need not be doublings.
+/// A step of a calibration whose shape equals its gain.
+fn step_toml(gain: f64) -> String {
+    format!("[[step]]\ngain = {gain}\nshape = [{gain}]\nbias = [[0.0, 0.0, 0.0, 0.0]]\n")
+}
+
+/// If each step has its own gain, the step nearest in ln K is used.
 #[test]
 fn steps_with_their_own_gains_need_not_be_doublings() {
-    let step = |gain: f64| {
-        format!("[[step]]\ngain = {gain}\nshape = [{gain}]\nbias = [[0.0, 0.0, 0.0, 0.0]]\n")
-    };
     let head = PRESETS[0].1.split("[[step]]").next().unwrap();
     let bare = head.replace("first-gain = 0.09391607086816033\n", "");
-    let text = bare.clone() + &[0.1, 0.3, 1.2].map(step).concat();
+    let text = bare.clone() + &[0.1, 0.3, 1.2].map(step_toml).concat();
     let camera = Calibration::parse(&text, "my.toml").unwrap();
     // The middles between the steps are √(0.1 · 0.3) = 0.1732 and √(0.3 · 1.2) = 0.6.
     for (gain, expected) in [
@@ -78,28 +80,25 @@ fn steps_with_their_own_gains_need_not_be_doublings() {
         let shape = camera.noise_at(gain, [0.0; 2], [0.0; 2]).read_shape;
         assert!((shape - expected).abs() < 1e-15, "K = {gain}: {shape}");
     }
-    let read = toml::to_string(&camera).unwrap();
-    assert_eq!(Calibration::parse(&read, "again").unwrap(), camera);
+    let text = toml::to_string(&camera).unwrap();
+    assert_eq!(Calibration::parse(&text, "again").unwrap(), camera);
     // As with first-gain, steps above the range of K are not used.
-    let low = Calibration {
+    let low_gains = Calibration {
         gain: [0.1, 0.3],
         ..camera
     };
-    assert!((low.noise_at(1.2, [0.0; 2], [0.0; 2]).read_shape - 0.3).abs() < 1e-15);
-    let gained = |index: usize| step([0.1, 0.3][index]);
-    let without = step(0.3).replace("gain = 0.3\n", "");
+    assert!((low_gains.noise_at(1.2, [0.0; 2], [0.0; 2]).read_shape - 0.3).abs() < 1e-15);
+    let (low, high) = (step_toml(0.1), step_toml(0.3));
+    let without = high.replace("gain = 0.3\n", "");
     for (text, part) in [
-        (
-            bare.clone() + &gained(0) + &without,
-            "step 2, gain: missing",
-        ),
-        (head.to_owned() + &gained(0), "first-gain: every [[step]]"),
+        (bare.clone() + &low + &without, "step 2, gain: missing"),
+        (head.to_owned() + &low, "first-gain: every [[step]]"),
         (bare.clone() + &without, "first-gain: missing"),
         (
-            bare.clone() + &gained(1) + &gained(0),
+            bare.clone() + &high + &low,
             "step 2, gain: 0.1 is not above 0.3",
         ),
-        (bare + &step(200.0), "step 1, gain: 200"),
+        (bare + &step_toml(200.0), "step 1, gain: 200"),
     ] {
         let error = Calibration::parse(&text, "my.toml")
             .unwrap_err()
@@ -111,7 +110,7 @@ fn steps_with_their_own_gains_need_not_be_doublings() {
     }
 }
 
-/// The digest of a camera is that of its JSON, which must not move with keys that a file does not have.
+/// The digest of a camera is computed from its JSON, which must not contain keys that the file does not have.
 #[test]
 fn a_preset_is_written_without_keys_that_it_lacks() {
     let text = serde_json::to_string(&sony()).unwrap();
@@ -132,7 +131,7 @@ fn offsets_reach_their_planes() {
 }
 
 #[test]
-fn an_impossible_calibration_is_refused_with_its_key() {
+fn errors_name_the_key_of_an_invalid_calibration() {
     let good = PRESETS[0].1;
     for (from, to, part) in [
         ("adu-range = 15871.0", "adu-range = nan", "adu-range: NaN"),
@@ -165,7 +164,7 @@ fn an_impossible_calibration_is_refused_with_its_key() {
 }
 
 #[test]
-fn a_calibration_is_read_as_it_was_written() {
+fn a_written_calibration_can_be_parsed() {
     for (name, _) in PRESETS {
         let calibration = Calibration::preset(name).unwrap();
         let text = calibration.to_toml(&["a".to_owned(), "b = 1".to_owned()]);

@@ -24,13 +24,9 @@ fn streak(length: f64, angle: f64) -> Streak {
     Streak::new(length, angle).unwrap()
 }
 
-/// The definition in double precision: each pixel is the weighted mean of its neighbours, the edge repeated.
-fn defined(clean: &Rgb, streak: Streak) -> Vec<f64> {
+/// Reference in double precision: each pixel is the weighted mean of its neighbours, with repeated edges.
+fn reference(clean: &Rgb, streak: Streak) -> Vec<f64> {
     let (height, width) = (clean.height(), clean.width());
-    let light = |row: usize, column: usize, channel: usize| {
-        let code = clean.samples()[3 * (row * width + column) + channel];
-        libm::pow(f64::from(code) / 255.0, 2.2)
-    };
     let taps = streak.taps();
     let mut blurred = Vec::new();
     for i in 0..3 * height * width {
@@ -39,7 +35,8 @@ fn defined(clean: &Rgb, streak: Streak) -> Vec<f64> {
             let [right, down] = tap.offset;
             let row = row.saturating_add_signed(down).min(height - 1);
             let column = column.saturating_add_signed(right).min(width - 1);
-            tap.weight * light(row, column, channel)
+            let code = clean.samples()[3 * (row * width + column) + channel];
+            tap.weight * libm::pow(f64::from(code) / 255.0, 2.2)
         });
         blurred.push(weighted.sum());
     }
@@ -68,7 +65,7 @@ fn light_is_the_weighted_mean_of_the_path() {
     for (height, width) in [(23, 61), (3, 5), (1, 1), (40, 150)] {
         let clean = picture(height, width);
         for (length, angle) in PATHS {
-            let expected = defined(&clean, streak(length, angle));
+            let expected = reference(&clean, streak(length, angle));
             let found = blur((&clean).into(), streak(length, angle));
             for (found, expected) in found.samples().iter().zip(&expected) {
                 let off = (f64::from(*found) - expected).abs();
@@ -87,7 +84,7 @@ fn light_is_the_weighted_mean_of_the_path() {
     }
 }
 
-/// A white edge blurred over four pixels: 99, 163, 206 and 240. Blurred in codes it would be 32, 96, 159 and 223.
+/// A white edge blurred over four pixels gives 99, 163, 206 and 240. Blurring codes would give 32, 96, 159 and 223.
 #[test]
 fn an_edge_is_blurred_in_light_and_not_in_codes() {
     let edge = (0..36).map(|i| if i < 18 { 0 } else { 255 }).collect();
@@ -98,7 +95,7 @@ fn an_edge_is_blurred_in_light_and_not_in_codes() {
 }
 
 #[test]
-fn still_and_even_pictures_are_unchanged() {
+fn still_and_uniform_images_are_unchanged() {
     let clean = picture(9, 17);
     assert_eq!(blurred_codes(&clean, streak(0.0, 33.0)), clean);
     assert_ne!(blurred_codes(&clean, streak(0.4, 33.0)), clean);
@@ -111,14 +108,14 @@ fn still_and_even_pictures_are_unchanged() {
     }
 }
 
-/// Neither threads nor the instruction set change a bit, and light goes in as the codes that it is of.
+/// The result depends neither on threads nor on the instruction set, and is the same for codes and for their light.
 #[test]
 fn threads_and_instructions_change_nothing() {
     let clean = picture(40, 150);
     let light = clean
         .samples()
         .iter()
-        .map(|code| shown_light()[usize::from(*code)]);
+        .map(|code| display_light()[usize::from(*code)]);
     let light = Light::new(40, 150, light.collect()).unwrap();
     for (length, angle) in PATHS {
         let path = streak(length, angle);

@@ -1,55 +1,55 @@
-//! The table of a profile from four inks to colours: [`InkTable`].
+//! Table of an ICC profile from CMYK ink amounts to colours: [`InkTable`].
 
 use moxcms::{DataColorSpace, LutDataType, LutMultidimensionalType, LutStore, LutWarehouse};
 
-use crate::colour::curve::{ToneCurve, interpolated};
+use crate::colour::curve::{ToneCurve, interpolate};
 use crate::colour::primaries::{D50, IDENTITY, Matrix, times, xyz_to_srgb};
 use crate::colour::srgb::EIGHT;
 
-/// A table of colours at a grid of amounts of four inks, with a curve for each ink before it, and a curve for each value after it
-/// (ICC.1:2022, sections 10.10 to 10.12). Between the points of the grid, colours are interpolated linearly along each ink.
+/// Table of colours on a grid of ink amounts, with a curve per ink before the grid, and a curve per value after it (ICC.1:2022, sections
+/// 10.10 to 10.12). Between grid points, colours are interpolated linearly along each ink.
 #[derive(Debug)]
 pub(super) struct InkTable {
-    /// For each ink, the place in the grid of each of its 256 amounts: the point below, and the share of the way to the next.
-    places: [Vec<(usize, f64)>; 4],
-    /// The values of the grid, in [0, 1]; the last ink varies fastest.
+    /// Grid position of the 256 amounts of each ink: the point below, and the fraction of the way to the next point.
+    positions: [Vec<(usize, f64)>; 4],
+    /// Values of the grid points, in [0, 1]; the last ink varies fastest.
     grid: Vec<[f64; 3]>,
-    /// The distance in `grid` between two neighbours along each ink.
-    steps: [usize; 4],
-    after: After,
-    /// The meaning of the values after the curves.
-    values: Values,
+    /// Distance in `grid` between neighbours along each ink.
+    strides: [usize; 4],
+    after_grid: AfterGrid,
+    /// Colour encoding of the values after these curves.
+    encoding: ValueEncoding,
     to_srgb: Matrix,
 }
 
-/// The steps from the values of the grid to the values of colours.
+/// Steps from the grid values to the colour values.
 #[derive(Debug)]
 #[allow(clippy::large_enum_variant, reason = "a profile has one")]
-enum After {
-    /// A curve each, as values at equal distances.
+enum AfterGrid {
+    /// One curve per value, with equally spaced entries.
     Tables([Vec<f64>; 3]),
-    /// A curve each, a matrix with an offset, and a curve each. Without them, the curves alone.
+    /// Optional first curves with a matrix and an offset, then the last curves.
     Curves {
         first: Option<([ToneCurve; 3], Matrix, [f64; 3])>,
         last: [ToneCurve; 3],
     },
 }
 
-/// The meaning of three values in [0, 1] (ICC.1:2022, section 6.3.4).
+/// Encoding of a colour as three values in [0, 1] (ICC.1:2022, section 6.3.4).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Values {
+enum ValueEncoding {
     Xyz,
-    /// CIELAB, with the full scale at 100 and 127.
+    /// CIELAB, where 1 is L* = 100, or a* and b* = 127.
     Lab,
-    /// CIELAB in 16 bits of `lut16Type`, with the full scale a little above.
+    /// CIELAB in the 16 bits of `lut16Type`, where 1 is slightly above these.
     LegacyLab,
 }
 
 impl InkTable {
-    /// The table of a profile.
+    /// Converts the table of a profile. `connection` is the profile connection space.
     ///
     /// # Errors
-    /// If it is not one from four inks to three values, or is cut.
+    /// If it does not map four inks to three values, or is truncated.
     pub(super) fn new(table: &LutWarehouse, connection: DataColorSpace) -> Result<Self, String> {
         let is_lab = match connection {
             DataColorSpace::Lab => true,
@@ -63,85 +63,90 @@ impl InkTable {
         .ok_or_else(|| "its table is not one from four inks to three values, or is cut".to_owned())
     }
 
-    /// The table of the type `lut8Type` or `lut16Type`. `None` if it is broken.
+    /// Converts a table of the type `lut8Type` or `lut16Type`; `None` if it is broken.
     fn from_lut(table: &LutDataType, is_lab: bool) -> Option<Self> {
         if (table.num_input_channels, table.num_output_channels) != (4, 3) {
             return None;
         }
         let points = [usize::from(table.num_clut_grid_points); 4];
-        let before = channels::<4>(&values(&table.input_table))?;
-        let places = places(points, |ink, amount| interpolated(&before[ink], amount))?;
-        let values = match (is_lab, &table.clut_table) {
-            (false, _) => Values::Xyz,
-            (true, LutStore::Store8(_)) => Values::Lab,
-            (true, LutStore::Store16(_)) => Values::LegacyLab,
+        let before = split_channels::<4>(&unit_values(&table.input_table))?;
+        let positions = grid_positions(points, |ink, amount| interpolate(&before[ink], amount))?;
+        let encoding = match (is_lab, &table.clut_table) {
+            (false, _) => ValueEncoding::Xyz,
+            (true, LutStore::Store8(_)) => ValueEncoding::Lab,
+            (true, LutStore::Store16(_)) => ValueEncoding::LegacyLab,
         };
-        let after = After::Tables(channels::<3>(&self::values(&table.output_table))?);
-        Self::build(points, places, &table.clut_table, after, values)
+        let after = AfterGrid::Tables(split_channels::<3>(&unit_values(&table.output_table))?);
+        Self::build(points, positions, &table.clut_table, after, encoding)
     }
 
-    /// The table of the type `lutAToBType`. `None` if it is broken.
+    /// Converts a table of the type `lutAToBType`; `None` if it is broken.
     fn from_a_to_b(table: &LutMultidimensionalType, is_lab: bool) -> Option<Self> {
         if (table.num_input_channels, table.num_output_channels) != (4, 3) {
             return None;
         }
         let points = [0, 1, 2, 3].map(|ink| usize::from(table.grid_points[ink]));
-        let before = curves::<4>(&table.a_curves)?;
-        let places = places(points, |ink, amount| before[ink].light(amount))?;
+        let before = tone_curves::<4>(&table.a_curves)?;
+        let positions = grid_positions(points, |ink, amount| before[ink].light(amount))?;
         let first = match &*table.m_curves {
             [] => None,
             curves => {
                 let offset = [table.bias.v[0], table.bias.v[1], table.bias.v[2]];
-                Some((self::curves::<3>(curves)?, table.matrix.v, offset))
+                Some((tone_curves::<3>(curves)?, table.matrix.v, offset))
             }
         };
-        let last = curves::<3>(&table.b_curves)?;
-        let after = After::Curves { first, last };
-        let values = if is_lab { Values::Lab } else { Values::Xyz };
-        Self::build(points, places, table.clut.as_ref()?, after, values)
+        let last = tone_curves::<3>(&table.b_curves)?;
+        let after = AfterGrid::Curves { first, last };
+        let encoding = if is_lab {
+            ValueEncoding::Lab
+        } else {
+            ValueEncoding::Xyz
+        };
+        Self::build(points, positions, table.clut.as_ref()?, after, encoding)
     }
 
+    /// Combines the parts of a table; `None` if the grid does not have the number of values that `points` requires.
     fn build(
         points: [usize; 4],
-        places: [Vec<(usize, f64)>; 4],
+        positions: [Vec<(usize, f64)>; 4],
         grid: &LutStore,
-        after: After,
-        values: Values,
+        after_grid: AfterGrid,
+        encoding: ValueEncoding,
     ) -> Option<Self> {
-        let grid = self::values(grid);
-        let (grid, rest) = grid.as_chunks::<3>();
-        let whole = points
+        let values = unit_values(grid);
+        let (grid, rest) = values.as_chunks::<3>();
+        let count = points
             .iter()
             .try_fold(1_usize, |all, points| all.checked_mul(*points))?;
-        (grid.len() == whole && rest.is_empty()).then(|| Self {
-            places,
+        (grid.len() == count && rest.is_empty()).then(|| Self {
+            positions,
             grid: grid.to_vec(),
-            steps: [
+            strides: [
                 points[1] * points[2] * points[3],
                 points[2] * points[3],
                 points[3],
                 1,
             ],
-            after,
-            values,
+            after_grid,
+            encoding,
             to_srgb: xyz_to_srgb(IDENTITY),
         })
     }
 
-    /// The sRGB codes of amounts of ink, 0 for none and 255 for full. Colours that sRGB does not have are clipped.
+    /// Converts ink amounts, from 0 (none) to 255 (full), to sRGB codes. Colours outside the gamut of sRGB are clipped.
     pub(super) fn srgb(&self, inks: [u8; 4]) -> [u8; 3] {
-        let values = self.after(self.interpolated(inks));
-        let xyz = match self.values {
-            // 1 stands for 1 + 32767/32768.
-            Values::Xyz => values.map(|value| value * 65_535.0 / 32_768.0),
-            Values::Lab => xyz([
+        let values = self.colour_values(self.grid_values(inks));
+        let xyz = match self.encoding {
+            // The value 1 means XYZ of 1 + 32767/32768.
+            ValueEncoding::Xyz => values.map(|value| value * 65_535.0 / 32_768.0),
+            ValueEncoding::Lab => xyz_from_lab([
                 values[0] * 100.0,
                 values[1] * 255.0 - 128.0,
                 values[2] * 255.0 - 128.0,
             ]),
-            Values::LegacyLab => {
+            ValueEncoding::LegacyLab => {
                 let codes = values.map(|value| value * 65_535.0);
-                xyz([
+                xyz_from_lab([
                     codes[0] / 652.8,
                     codes[1] / 256.0 - 128.0,
                     codes[2] / 256.0 - 128.0,
@@ -151,29 +156,34 @@ impl InkTable {
         times(self.to_srgb, xyz).map(|light| EIGHT.encode(light) as u8)
     }
 
-    /// The value of the grid between its sixteen points around amounts of ink.
-    fn interpolated(&self, inks: [u8; 4]) -> [f64; 3] {
-        let places = [0, 1, 2, 3].map(|ink| self.places[ink][usize::from(inks[ink])]);
+    /// Interpolates the grid between the sixteen points around the ink amounts.
+    fn grid_values(&self, inks: [u8; 4]) -> [f64; 3] {
+        let positions = [0, 1, 2, 3].map(|ink| self.positions[ink][usize::from(inks[ink])]);
         let mut sum = [0.0; 3];
         for corner in 0..16_usize {
-            let (mut at, mut weight) = (0, 1.0);
-            for (ink, (below, share)) in places.iter().enumerate() {
+            let (mut index, mut weight) = (0, 1.0);
+            for (ink, (below, fraction)) in positions.iter().enumerate() {
                 let is_above = corner >> ink & 1;
-                at += (below + is_above) * self.steps[ink];
-                weight *= if is_above == 1 { *share } else { 1.0 - share };
+                index += (below + is_above) * self.strides[ink];
+                weight *= if is_above == 1 {
+                    *fraction
+                } else {
+                    1.0 - fraction
+                };
             }
             if weight > 0.0 {
-                let value = self.grid[at];
+                let value = self.grid[index];
                 sum = [0, 1, 2].map(|i| sum[i] + weight * value[i]);
             }
         }
         sum
     }
 
-    fn after(&self, values: [f64; 3]) -> [f64; 3] {
-        match &self.after {
-            After::Tables(tables) => [0, 1, 2].map(|i| interpolated(&tables[i], values[i])),
-            After::Curves { first, last } => {
+    /// Applies the curves and the matrix after the grid.
+    fn colour_values(&self, values: [f64; 3]) -> [f64; 3] {
+        match &self.after_grid {
+            AfterGrid::Tables(tables) => [0, 1, 2].map(|i| interpolate(&tables[i], values[i])),
+            AfterGrid::Curves { first, last } => {
                 let values = first.as_ref().map_or(values, |(curves, matrix, offset)| {
                     let values = times(*matrix, [0, 1, 2].map(|i| curves[i].light(values[i])));
                     [0, 1, 2].map(|i| (values[i] + offset[i]).clamp(0.0, 1.0))
@@ -184,8 +194,8 @@ impl InkTable {
     }
 }
 
-/// The numbers of a table in [0, 1].
-fn values(table: &LutStore) -> Vec<f64> {
+/// The numbers of a table, scaled to [0, 1].
+fn unit_values(table: &LutStore) -> Vec<f64> {
     match table {
         LutStore::Store8(codes) => codes.iter().map(|code| f64::from(*code) / 255.0).collect(),
         LutStore::Store16(codes) => codes
@@ -195,28 +205,34 @@ fn values(table: &LutStore) -> Vec<f64> {
     }
 }
 
-/// A table of one channel after another; `None` if a channel has fewer than two values.
-fn channels<const N: usize>(values: &[f64]) -> Option<[Vec<f64>; N]> {
+/// Splits a table into `N` channels of equal length; `None` if a channel has fewer than two values.
+fn split_channels<const N: usize>(values: &[f64]) -> Option<[Vec<f64>; N]> {
     let length = values.len() / N;
     if length < 2 || !values.len().is_multiple_of(N) {
         return None;
     }
-    let channels: Vec<Vec<f64>> = values.chunks_exact(length).map(<[f64]>::to_vec).collect();
-    channels.try_into().ok()
+    values
+        .chunks_exact(length)
+        .map(<[f64]>::to_vec)
+        .collect::<Vec<Vec<f64>>>()
+        .try_into()
+        .ok()
 }
 
-/// A curve each; `None` if there are fewer or more, or a number is not finite.
-fn curves<const N: usize>(curves: &[moxcms::ToneReprCurve]) -> Option<[ToneCurve; N]> {
-    let curves: Vec<ToneCurve> = curves
+/// Converts `N` curves; `None` for another number of curves, or if a parameter is not finite.
+fn tone_curves<const N: usize>(curves: &[moxcms::ToneReprCurve]) -> Option<[ToneCurve; N]> {
+    curves
         .iter()
         .map(ToneCurve::from_profile)
-        .collect::<Result<_, _>>()
-        .ok()?;
-    curves.try_into().ok()
+        .collect::<Result<Vec<ToneCurve>, _>>()
+        .ok()?
+        .try_into()
+        .ok()
 }
 
-/// The places in a grid of these numbers of points of the 256 amounts of each ink; `None` if an ink has no two points.
-fn places(
+/// The grid positions of the 256 amounts of each ink. `points` is the number of grid points per ink, `before` the curve per ink. `None` if
+/// an ink has fewer than two points.
+fn grid_positions(
     points: [usize; 4],
     before: impl Fn(usize, f64) -> f64,
 ) -> Option<[Vec<(usize, f64)>; 4]> {
@@ -235,18 +251,18 @@ fn places(
     }))
 }
 
-/// XYZ of CIELAB with the white D50 (CIE 15:2018, section 8.2.1).
-fn xyz([lightness, a, b]: [f64; 3]) -> [f64; 3] {
+/// Converts CIELAB with the white D50 to XYZ (CIE 15:2018, section 8.2.1).
+fn xyz_from_lab([lightness, a, b]: [f64; 3]) -> [f64; 3] {
     let y = (lightness + 16.0) / 116.0;
     let roots = [y + a / 500.0, y, y - b / 200.0];
     [0, 1, 2].map(|i| {
         let root = roots[i];
-        let share = if root > 6.0 / 29.0 {
+        let relative = if root > 6.0 / 29.0 {
             root * root * root
         } else {
             (root - 4.0 / 29.0) * 108.0 / 841.0
         };
-        share * D50[i]
+        relative * D50[i]
     })
 }
 
@@ -254,23 +270,24 @@ fn xyz([lightness, a, b]: [f64; 3]) -> [f64; 3] {
 mod tests {
     use super::*;
 
-    /// A table of two points an ink, whose lightness falls by a quarter for each full ink, and whose a and b are 0.
-    fn grey(is_16: bool) -> LutDataType {
+    fn lut_store(codes: Vec<u16>, is_16: bool) -> LutStore {
+        if is_16 {
+            LutStore::Store16(codes)
+        } else {
+            LutStore::Store8(codes.iter().map(|code| *code as u8).collect())
+        }
+    }
+
+    /// A table with two points per ink, whose lightness falls by a quarter for each full ink, and whose a and b are 0.
+    fn grey_table(is_16: bool) -> LutDataType {
         let zero = if is_16 { 0x8000 } else { 128 };
         let clut: Vec<u16> = (0..16_u16)
             .flat_map(|corner| {
-                let most = if is_16 { 0xFF00 } else { 255 };
-                [most - most / 4 * corner.count_ones() as u16, zero, zero]
+                let white = if is_16 { 0xFF00 } else { 255 };
+                [white - white / 4 * corner.count_ones() as u16, zero, zero]
             })
             .collect();
-        let straight = |channels: usize| [0_u16, if is_16 { 65_535 } else { 255 }].repeat(channels);
-        let store = |codes: Vec<u16>| {
-            if is_16 {
-                LutStore::Store16(codes)
-            } else {
-                LutStore::Store8(codes.iter().map(|code| *code as u8).collect())
-            }
-        };
+        let identity = [0_u16, if is_16 { 65_535 } else { 255 }];
         LutDataType {
             num_input_channels: 4,
             num_output_channels: 3,
@@ -278,9 +295,9 @@ mod tests {
             matrix: moxcms::Matrix3d::IDENTITY,
             num_input_table_entries: 2,
             num_output_table_entries: 2,
-            input_table: store(straight(4)),
-            clut_table: store(clut),
-            output_table: store(straight(3)),
+            input_table: lut_store(identity.repeat(4), is_16),
+            clut_table: lut_store(clut, is_16),
+            output_table: lut_store(identity.repeat(3), is_16),
             lut_type: if is_16 {
                 moxcms::LutType::Lut16
             } else {
@@ -290,9 +307,9 @@ mod tests {
     }
 
     #[test]
-    fn lightness_becomes_codes() {
+    fn lightness_is_converted_to_codes() {
         for is_16 in [false, true] {
-            let table = LutWarehouse::Lut(grey(is_16));
+            let table = LutWarehouse::Lut(grey_table(is_16));
             let table = InkTable::new(&table, DataColorSpace::Lab).unwrap();
             // Codes of L* 100, 75, 50 (CSS Color 4: lab(50 0 0) is rgb(119 119 119), lab(75 0 0) is rgb(185 185 185)).
             for (inks, code) in [
@@ -310,23 +327,23 @@ mod tests {
 
     #[test]
     fn broken_tables_are_refused() {
-        let cut = LutDataType {
+        let truncated = LutDataType {
             clut_table: LutStore::Store16(vec![0; 47]),
-            ..grey(true)
+            ..grey_table(true)
         };
-        let of_rgb = LutDataType {
+        let for_rgb = LutDataType {
             num_input_channels: 3,
-            ..grey(true)
+            ..grey_table(true)
         };
         let without_curves = LutDataType {
             input_table: LutStore::Store16(Vec::new()),
-            ..grey(true)
+            ..grey_table(true)
         };
-        for table in [cut, of_rgb, without_curves] {
+        for table in [truncated, for_rgb, without_curves] {
             let table = LutWarehouse::Lut(table);
             assert!(InkTable::new(&table, DataColorSpace::Lab).is_err());
         }
-        let whole = LutWarehouse::Lut(grey(true));
+        let whole = LutWarehouse::Lut(grey_table(true));
         assert!(InkTable::new(&whole, DataColorSpace::Rgb).is_err());
     }
 }

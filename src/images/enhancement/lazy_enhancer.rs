@@ -1,4 +1,4 @@
-//! An enhancer whose images are all in the image store: [`RestingEnhancer`].
+//! An enhancer that is opened only if the image store lacks one of its images: [`LazyEnhancer`].
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -9,30 +9,30 @@ use crate::images::enhancement::enhancers::EnhancerRunArgs;
 use crate::types::{EnhancerName, Rgb};
 use darkqa_enhance::{Enhancer, Findings, ImageUse, Implausible, ModelFile, Stopper, Usage};
 
-/// An enhancer that was opened and tried in another run, and all of whose images were in the store when the run began. It is opened if one
-/// of them is missing or damaged after all, once for all threads.
-pub(crate) struct RestingEnhancer {
+/// An enhancer that an earlier run probed, and whose images were all in the store when this run began. It is opened once, for all threads,
+/// if a stored image turns out to be missing or damaged.
+pub(crate) struct LazyEnhancer {
     name: EnhancerName,
     path: PathBuf,
     settings: EnhancerRunArgs,
     findings: Findings,
     usage: Usage,
-    state: Mutex<State>,
-    /// Ends its runs, once it is open.
+    session: Mutex<Session>,
+    /// Stops the session; set when it is opened.
     stopper: OnceLock<Stopper>,
     is_stopped: AtomicBool,
 }
 
 #[expect(clippy::large_enum_variant, reason = "there is one for each enhancer")]
-enum State {
+enum Session {
     Closed(ModelFile),
     Open(Enhancer),
-    /// It could not be opened, and why.
+    /// The reason why it could not be opened.
     Failed(String),
 }
 
-impl RestingEnhancer {
-    /// The model in a file, of which this is known.
+impl LazyEnhancer {
+    /// The model in a file, with the findings of its probe in an earlier run.
     pub(crate) fn new(file: ModelFile, settings: EnhancerRunArgs, findings: Findings) -> Self {
         findings.warn(file.name(), file.path());
         tracing::debug!(
@@ -45,7 +45,7 @@ impl RestingEnhancer {
             settings,
             usage: findings.usage(),
             findings,
-            state: Mutex::new(State::Closed(file)),
+            session: Mutex::new(Session::Closed(file)),
             stopper: OnceLock::new(),
             is_stopped: AtomicBool::new(false),
         }
@@ -55,45 +55,45 @@ impl RestingEnhancer {
         &self.name
     }
 
-    /// Path of the model's file, as messages call it.
+    /// Path of the model's file, for messages.
     pub(crate) fn path(&self) -> &Path {
         &self.path
     }
 
-    /// A handle to its note.
+    /// The usage note.
     pub(crate) fn usage(&self) -> &Usage {
         &self.usage
     }
 
-    /// Enhances a frame in a condition, and looks at the result, as [`Enhancer::enhance_noted`] does.
+    /// Opens the enhancer if necessary and calls [`Enhancer::enhance_noted`].
     ///
     /// # Errors
-    /// If it cannot be opened, which ends the run, or fails on the image.
+    /// If it cannot be opened (which ends the run), or fails on the image.
     pub(crate) fn enhance_noted(
         &self,
         image: &Rgb,
         place: [&dyn ToString; 2],
         implausible: Implausible,
     ) -> Result<(Rgb, ImageUse)> {
-        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
-        if let State::Closed(_) = &*state {
+        let mut session = self.session.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Session::Closed(_) = &*session {
             tracing::debug!("{}: opened, because the store lacks an image", self.name);
-            let not_open = State::Failed("was not opened".to_owned());
-            let closed = std::mem::replace(&mut *state, not_open);
-            *state = match self.opened(closed) {
-                Ok(enhancer) => State::Open(enhancer),
-                Err(problem) => State::Failed(problem.to_string()),
+            let not_open = Session::Failed("was not opened".to_owned());
+            let closed = std::mem::replace(&mut *session, not_open);
+            *session = match self.open(closed) {
+                Ok(enhancer) => Session::Open(enhancer),
+                Err(problem) => Session::Failed(problem.to_string()),
             };
         }
-        match &mut *state {
-            State::Open(enhancer) => enhancer.enhance_noted(image, place, implausible),
-            State::Closed(_) => Err(self.ended("was not opened")),
-            State::Failed(problem) => Err(self.ended(problem)),
+        match &mut *session {
+            Session::Open(enhancer) => enhancer.enhance_noted(image, place, implausible),
+            Session::Closed(_) => Err(self.ended("was not opened")),
+            Session::Failed(problem) => Err(self.ended(problem)),
         }
     }
 
-    fn opened(&self, state: State) -> Result<Enhancer> {
-        let State::Closed(file) = state else {
+    fn open(&self, session: Session) -> Result<Enhancer> {
+        let Session::Closed(file) = session else {
             return Err(self.ended("is in use"));
         };
         let enhancer = self.settings.open(file)?;
@@ -112,7 +112,7 @@ impl RestingEnhancer {
         }
     }
 
-    /// Stops its current image, and every later one, from another thread.
+    /// Stops the current image and all later ones; may be called from another thread.
     pub(crate) fn stop(&self) {
         self.is_stopped.store(true, Ordering::SeqCst);
         if let Some(stopper) = self.stopper.get() {

@@ -3,24 +3,25 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use super::{ImagePipeline, or_warning};
+use super::{ImagePipeline, ok_or_warn};
 use crate::error::Result;
 use crate::images::frame_work::FrameWork;
-use crate::images::frame_work::staged::{MadeImage, PixelsSent};
+use crate::images::frame_work::staged::{PixelsSent, PreparedImage};
 use crate::images::notes::thumbnail::{ShownObjects, thumbnail};
 use crate::images::notes::{ImageNotes, WantedNotes, fidelity};
-use crate::images::stored::{Needed, ThumbnailPlace};
+use crate::images::stored::Needed;
 use crate::images::timings::TimedStep;
 use crate::picture::Payload;
 use crate::types::{Condition, FrameId, Rgb, Thumbnail};
 
 impl ImagePipeline<'_> {
-    /// A frame in a condition as it is sent, with the notes that are wanted.
+    /// Makes the image of a frame in a condition as it is sent, with the wanted notes. `objects` are cropped for the thumbnail.
     pub(super) fn image_and_notes(
         &mut self,
         work: &mut FrameWork<'_>,
         condition: &Condition,
-        (name, shown): (&FrameId, Option<ShownObjects<'_>>),
+        name: &FrameId,
+        objects: Option<ShownObjects<'_>>,
         wanted: WantedNotes,
     ) -> Result<(Arc<Payload>, ImageNotes)> {
         let needed = if wanted.fidelity {
@@ -31,7 +32,7 @@ impl ImagePipeline<'_> {
         let image = self.image(work, condition, needed)?;
         let similarity = image.similarity.filter(|_| wanted.fidelity);
         let thumbnail = if wanted.thumbnail {
-            small_copy(work, condition, (name, shown), &image)?
+            stored_or_new_thumbnail(work, condition, name, objects, &image)?
         } else {
             None
         };
@@ -43,37 +44,41 @@ impl ImagePipeline<'_> {
     }
 }
 
-/// The small copy of an image, from the store if it is there; `None` with a warning if it cannot be made.
+/// The thumbnail of an image, from the store if possible; `None` with a warning if it cannot be made.
 ///
 /// # Errors
 /// If the frame cannot be decoded.
-fn small_copy(
+fn stored_or_new_thumbnail(
     work: &mut FrameWork<'_>,
     condition: &Condition,
-    (name, shown): (&FrameId, Option<ShownObjects<'_>>),
-    image: &MadeImage<'_>,
+    name: &FrameId,
+    objects: Option<ShownObjects<'_>>,
+    image: &PreparedImage<'_>,
 ) -> Result<Option<Thumbnail>> {
     let timings = work.steps.timings;
     let payload = &image.payload;
-    // The darkness of a photograph is in no key of the store.
-    let place = image.place.as_ref();
-    let place = place.filter(|_| payload.facts().pair.is_none());
-    let place = place.and_then(|place| place.thumbnail((name, condition), shown));
-    let read = |place: &ThumbnailPlace<'_>| place.read(payload.facts().digest);
+    // A store key does not contain how dark a photograph is, and the gain of the crops depends on that.
+    let place = image
+        .place
+        .as_ref()
+        .filter(|_| payload.facts().pair.is_none())
+        .and_then(|place| place.thumbnail(name, condition, objects));
     let stored = place
         .as_ref()
-        .and_then(|place| timings.time(TimedStep::Decode, || read(place)));
+        .and_then(|place| timings.time(TimedStep::Decode, || place.read(payload.facts().digest)));
     if stored.is_some() {
         return Ok(stored);
     }
     let started = Instant::now();
     let encoded: Option<Arc<Rgb>> = match &image.pixels {
         PixelsSent::Encoded(pixels) => Some(Arc::clone(pixels)),
-        PixelsSent::OfFile => Some(Arc::clone(work.resolved(condition)?.work.clean()?)),
+        PixelsSent::InFrameFile => Some(Arc::clone(work.resolve(condition)?.work.clean()?)),
         PixelsSent::Stored => None,
     };
-    let make = || thumbnail(name, condition, payload, encoded.as_deref(), shown);
-    let made = or_warning(name, condition, timings.time(TimedStep::Encode, make));
+    let made = timings.time(TimedStep::Encode, || {
+        thumbnail(name, condition, payload, encoded.as_deref(), objects)
+    });
+    let made = ok_or_warn(name, condition, made);
     if let (Some(place), Some(made)) = (place, &made) {
         place.write(made, started.elapsed().as_millis() as u64);
     }

@@ -1,8 +1,7 @@
-//! An image in the output folder with the JSON file that vouches for it: [`Placed`].
+//! An image in the output folder with its JSON sidecar: [`OutputImage`].
 //!
-//! A JSON file holds the recipe of its image and the digest of the image's bytes. What lies in the folder is judged by both, in this
-//! order: bytes, then pixels, then refusal. An image is in its place before its JSON file is, so that no JSON file vouches for an
-//! image that is not there.
+//! A sidecar contains the recipe of its image and the digest of the image file. An existing image is kept if its recipe and bytes match, or
+//! else its pixels; other images are refused. The image is written before its sidecar, so that no sidecar exists without its image.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -17,21 +16,21 @@ use crate::picture::png;
 use crate::picture::{ImageFile, ReadingRule};
 use crate::types::{Digest, Rgb};
 
-/// The origin of an image, as its JSON file holds it.
+/// The origin of an image, as written in its JSON sidecar.
 pub(crate) trait ImageOrigin: Clone + PartialEq + Serialize + DeserializeOwned {
-    /// The values of `schema` that are read; the first is written.
+    /// Accepted values of `schema`; the first one is written.
     const SCHEMAS: &'static [&'static str];
-    /// Whether an intact image with other settings is replaced; else it is refused.
-    const IS_REPLACED: bool;
+    /// True if an intact image with other settings is replaced; otherwise it is refused.
+    const REPLACES_OTHER_SETTINGS: bool;
 
-    /// How an image of this origin differs from the one that is asked for, as `made with --seed 0, now 9`.
+    /// How an existing image of this origin differs from the wanted one, such as `made with --seed 0, now 9`.
     fn difference(&self, wanted: &Self) -> String {
-        let fields = differing(&json!(self), &json!(wanted));
+        let fields = differing_fields(&json!(self), &json!(wanted));
         format!("{OTHER} ({})", fields.join(", "))
     }
 }
 
-/// The content of a JSON file beside an image.
+/// The JSON sidecar of an image.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Sidecar<R> {
     schema: String,
@@ -39,10 +38,10 @@ pub(crate) struct Sidecar<R> {
     darkqa_eval: String,
     #[serde(flatten)]
     pub(crate) recipe: R,
-    /// Why the image may be wrong although it was made (`--allow bad-enhancer`). It follows from all images of a call, and decides no pixel.
+    /// Why the image may be wrong (`--allow bad-enhancer`). Depends on all images of a call and does not affect the pixels.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     used_anyway: Option<String>,
-    /// The image file; `None` in files of the first schema.
+    /// The image file; `None` in sidecars of the first schema.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     output: Option<OutputFile>,
 }
@@ -50,11 +49,11 @@ pub(crate) struct Sidecar<R> {
 /// An image file as it was written.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct OutputFile {
-    /// The name of the file, in the folder of the JSON file.
+    /// Name of the file, in the folder of the sidecar.
     pub(crate) file: String,
-    /// Its length.
+    /// Length in bytes.
     bytes: u64,
-    /// The BLAKE3 digest of its bytes.
+    /// BLAKE3 digest of the file.
     digest: String,
 }
 
@@ -68,7 +67,7 @@ impl OutputFile {
         }
     }
 
-    /// The fault of a file with these bytes; `None` if they are those that were written.
+    /// How these bytes differ from the written file; `None` if they are the same.
     pub(crate) fn fault(&self, bytes: &[u8]) -> Option<String> {
         if bytes.len() as u64 != self.bytes {
             let found = bytes.len();
@@ -83,23 +82,24 @@ impl OutputFile {
 }
 
 impl<R: ImageOrigin> Sidecar<R> {
-    /// Reads a JSON file.
+    /// Reads a sidecar.
     ///
     /// # Errors
-    /// If it cannot be read, is not of this form, or has a schema that this program does not know.
+    /// If it cannot be read or parsed, or has an unknown schema.
     pub(crate) fn read(path: &Path) -> Result<Self> {
         let text = reading::text(path)?;
-        let wrong = |problem: String| Error::data(path.display(), problem);
-        let read: Self = serde_json::from_str(&text)
-            .map_err(|e| wrong(format!("not a JSON file of an image: {e}")))?;
-        if !R::SCHEMAS.contains(&&*read.schema) {
+        let sidecar: Self = serde_json::from_str(&text).map_err(|e| {
+            Error::data(
+                path.display(),
+                format_args!("not a JSON file of an image: {e}"),
+            )
+        })?;
+        if !R::SCHEMAS.contains(&&*sidecar.schema) {
             let expected = R::SCHEMAS.join(" or ");
-            return Err(wrong(format!(
-                "schema {:?}; {expected} expected",
-                read.schema
-            )));
+            let problem = format_args!("schema {:?}; {expected} expected", sidecar.schema);
+            return Err(Error::data(path.display(), problem));
         }
-        Ok(read)
+        Ok(sidecar)
     }
 
     /// The version of the program that wrote the file.
@@ -107,13 +107,14 @@ impl<R: ImageOrigin> Sidecar<R> {
         &self.darkqa_eval
     }
 
-    /// Whether the image of the file was written with these bytes; false for files of the first schema.
-    pub(crate) fn vouches_for(&self, image: Digest) -> bool {
-        let output = self.output.as_ref();
-        output.is_some_and(|output| output.digest == image.to_string())
+    /// True if the image was written with this digest; false for sidecars of the first schema.
+    pub(crate) fn has_digest(&self, image: Digest) -> bool {
+        self.output
+            .as_ref()
+            .is_some_and(|output| output.digest == image.to_string())
     }
 
-    fn new(recipe: R, place: &Placed, bytes: &[u8]) -> Self {
+    fn new(recipe: R, place: &OutputImage, bytes: &[u8]) -> Self {
         Self {
             schema: R::SCHEMAS[0].to_owned(),
             darkqa_eval: env!("CARGO_PKG_VERSION").to_owned(),
@@ -134,29 +135,29 @@ impl<R: ImageOrigin> Sidecar<R> {
 pub(crate) enum ImageOutcome {
     /// The image was made.
     Written,
-    /// The image was there.
+    /// The image existed already.
     Unchanged,
-    /// Another image is there.
+    /// Another image exists in its place.
     Refused(Refusal),
 }
 
-/// The reason why an image was not made.
+/// An image that was not made, because another one exists in its place.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Refusal {
-    /// The image in its place.
+    /// Path of the existing image.
     pub(crate) image: PathBuf,
     /// How it differs, and the remedy.
     pub(crate) problem: String,
 }
 
 impl Refusal {
-    /// The error of a command that makes one image.
+    /// The error for a command that makes only one image.
     pub(crate) fn into_error(self) -> Error {
         Error::data(self.image.display(), self.problem)
     }
 }
 
-/// The numbers of images by outcome.
+/// Number of images by outcome.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct ImageCounts {
     pub(crate) written: usize,
@@ -165,7 +166,7 @@ pub(crate) struct ImageCounts {
 }
 
 impl ImageCounts {
-    /// Counts an image. One that was refused counts as failed; the reason is returned.
+    /// Counts an image. A refusal counts as failed and is returned.
     #[must_use]
     pub(crate) fn add(&mut self, outcome: ImageOutcome) -> Option<Refusal> {
         match outcome {
@@ -179,43 +180,46 @@ impl ImageCounts {
         None
     }
 
-    /// The images that were not written, as words to append; empty if there are none.
-    pub(crate) fn unwritten(self) -> String {
-        let part = |number: usize, what: &str| match number {
-            0 => String::new(),
-            _ => format!(", {number} {what}"),
-        };
-        part(
-            self.unchanged,
-            "left as they were (--force makes them again)",
-        ) + &part(self.failed, "failed")
+    /// Text about the images that were not written, to append to a line; empty if all were written.
+    pub(crate) fn not_written_text(self) -> String {
+        [
+            (
+                self.unchanged,
+                "left as they were (--force makes them again)",
+            ),
+            (self.failed, "failed"),
+        ]
+        .into_iter()
+        .filter(|(number, _)| *number > 0)
+        .map(|(number, what)| format!(", {number} {what}"))
+        .collect()
     }
 }
 
-/// The treatment of an existing file in the folder.
-enum Verdict {
-    /// It is the image; nothing is to be done.
+/// The action for one output image, depending on the existing files.
+enum OutputAction {
+    /// The image exists; do nothing.
     Keep,
-    /// It must be made. The text states why, if something else was there.
+    /// Make the image. The text is the reason to replace an existing file.
     Make(Option<&'static str>),
-    /// It is the image if its pixels are, and then gets its JSON file; else the text states what is wrong.
+    /// Compare the pixels of the existing image: if equal, write its sidecar; otherwise refuse with this text.
     Compare(Rgb, String),
-    /// It is another image, which the text describes.
+    /// Refuse, because another image exists; the text describes the difference.
     Refuse(String),
 }
 
-/// The place of an image and of its JSON file.
-pub(crate) struct Placed {
+/// The paths of an output image and its JSON sidecar.
+pub(crate) struct OutputImage {
     image: PathBuf,
     json: PathBuf,
-    /// Whether to write over whatever is there.
+    /// True if existing files are overwritten.
     is_forced: bool,
-    /// Why the image may be wrong although it is made.
+    /// Why the image may be wrong; written to the sidecar.
     used_anyway: Option<String>,
 }
 
-impl Placed {
-    /// The place of the image `name` in a folder.
+impl OutputImage {
+    /// The output image `name` in a folder.
     pub(crate) fn new(folder: &Path, name: &str, is_forced: bool) -> Self {
         let [image, json] = [".png", ".json"].map(|end| folder.join(name.to_owned() + end));
         Self {
@@ -226,40 +230,40 @@ impl Placed {
         }
     }
 
-    /// The same place, whose JSON file gives the reason the image may be wrong.
-    pub(crate) fn used_anyway(self, used_anyway: Option<String>) -> Self {
+    /// Sets the reason why the image may be wrong.
+    pub(crate) fn with_used_anyway(self, used_anyway: Option<String>) -> Self {
         Self {
             used_anyway,
             ..self
         }
     }
 
-    /// Puts the image of a recipe in its place, unless it is there.
+    /// Makes and writes the image of a recipe, unless it exists.
     ///
     /// # Errors
     /// If a file cannot be read or written.
-    pub(crate) fn put<R: ImageOrigin>(
+    pub(crate) fn write_unless_present<R: ImageOrigin>(
         &self,
         recipe: &R,
         make: impl FnOnce() -> Result<Rgb>,
     ) -> Result<ImageOutcome> {
-        match self.verdict(recipe)? {
-            Verdict::Keep => Ok(ImageOutcome::Unchanged),
-            Verdict::Make(why) => {
+        match self.action(recipe)? {
+            OutputAction::Keep => Ok(ImageOutcome::Unchanged),
+            OutputAction::Make(why) => {
                 if let Some(why) = why {
                     tracing::warn!("{}: {why}; it is made again", self.image.display());
                 }
                 self.write(recipe, &png(&make()?)?)
             }
-            Verdict::Compare(there, problem) => {
-                if there != make()? {
-                    return Ok(self.refused(&problem));
+            OutputAction::Compare(existing, problem) => {
+                if existing != make()? {
+                    return Ok(self.refuse(&problem));
                 }
                 let bytes = reading::bytes(&self.image)?;
                 Sidecar::new(recipe.clone(), self, &bytes).write(&self.json)?;
                 Ok(ImageOutcome::Unchanged)
             }
-            Verdict::Refuse(problem) => Ok(self.refused(&problem)),
+            OutputAction::Refuse(problem) => Ok(self.refuse(&problem)),
         }
     }
 
@@ -269,39 +273,39 @@ impl Placed {
         Ok(ImageOutcome::Written)
     }
 
-    fn verdict<R: ImageOrigin>(&self, recipe: &R) -> Result<Verdict> {
+    fn action<R: ImageOrigin>(&self, recipe: &R) -> Result<OutputAction> {
         if self.is_forced || !self.image.exists() {
-            return Ok(Verdict::Make(None));
+            return Ok(OutputAction::Make(None));
         }
         let bytes = reading::bytes(&self.image)?;
         if !self.json.exists() {
-            let problem = "no JSON file describes it, and its pixels differ";
-            let problem = problem.to_owned();
-            return Ok(match decoded(&self.image, &bytes) {
-                Some(there) => Verdict::Compare(there, problem),
-                None => Verdict::Refuse(problem),
+            let problem = "no JSON file describes it, and its pixels differ".to_owned();
+            return Ok(match decode(&self.image, &bytes) {
+                Some(existing) => OutputAction::Compare(existing, problem),
+                None => OutputAction::Refuse(problem),
             });
         }
         let stored = Sidecar::<R>::read(&self.json)?;
         let fault = stored.output.as_ref().map(|output| output.fault(&bytes));
         if stored.recipe != *recipe {
-            if R::IS_REPLACED && fault == Some(None) {
-                return Ok(Verdict::Make(Some(OTHER)));
+            if R::REPLACES_OTHER_SETTINGS && fault == Some(None) {
+                return Ok(OutputAction::Make(Some(OTHER)));
             }
-            return Ok(Verdict::Refuse(stored.recipe.difference(recipe)));
+            return Ok(OutputAction::Refuse(stored.recipe.difference(recipe)));
         }
-        Ok(match (fault, decoded(&self.image, &bytes)) {
-            (Some(None), _) => Verdict::Keep,
-            (_, None) => Verdict::Make(Some("cut or damaged")),
-            (fault, Some(there)) => {
-                let fault = fault.flatten();
-                let fault = fault.unwrap_or_else(|| "its JSON file has no digest".to_owned());
-                Verdict::Compare(there, format!("{fault}, and its pixels differ"))
+        Ok(match (fault, decode(&self.image, &bytes)) {
+            (Some(None), _) => OutputAction::Keep,
+            (_, None) => OutputAction::Make(Some("cut or damaged")),
+            (fault, Some(existing)) => {
+                let fault = fault
+                    .flatten()
+                    .unwrap_or_else(|| "its JSON file has no digest".to_owned());
+                OutputAction::Compare(existing, format!("{fault}, and its pixels differ"))
             }
         })
     }
 
-    fn refused(&self, problem: &str) -> ImageOutcome {
+    fn refuse(&self, problem: &str) -> ImageOutcome {
         ImageOutcome::Refused(Refusal {
             image: self.image.clone(),
             problem: format!("{problem}; --force overwrites it, another --out keeps both"),
@@ -309,11 +313,11 @@ impl Placed {
     }
 }
 
-/// Why an image is not the one that is asked for.
+/// Difference between an existing image and the wanted one.
 const OTHER: &str = "made from another image or with other settings";
 
-/// The names of the fields that differ, with those of objects in them.
-pub(crate) fn differing(one: &Value, other: &Value) -> Vec<String> {
+/// The names of the fields that differ between two JSON objects, including nested fields.
+pub(crate) fn differing_fields(one: &Value, other: &Value) -> Vec<String> {
     let (Some(one), Some(other)) = (one.as_object(), other.as_object()) else {
         return Vec::new();
     };
@@ -323,7 +327,7 @@ pub(crate) fn differing(one: &Value, other: &Value) -> Vec<String> {
         .filter(|name| one.get(*name) != other.get(*name))
         .map(|name| {
             let inner = one.get(name).zip(other.get(name));
-            match inner.map_or_else(Vec::new, |(one, other)| differing(one, other)) {
+            match inner.map_or_else(Vec::new, |(one, other)| differing_fields(one, other)) {
                 inner if inner.is_empty() => name.clone(),
                 inner => format!("{name}: {}", inner.join(" and ")),
             }
@@ -331,10 +335,10 @@ pub(crate) fn differing(one: &Value, other: &Value) -> Vec<String> {
         .collect()
 }
 
-/// The pixels of a PNG; `None` if it cannot be decoded.
-fn decoded(path: &Path, bytes: &[u8]) -> Option<Rgb> {
+/// The pixels of an image file; `None` if it cannot be decoded.
+fn decode(path: &Path, bytes: &[u8]) -> Option<Rgb> {
     let rule = ReadingRule {
-        most_pixels: u64::MAX / 8,
+        max_pixels: u64::MAX / 8,
         ..ReadingRule::default()
     };
     let file = ImageFile::new(bytes.to_vec(), path.display().to_string(), rule);
