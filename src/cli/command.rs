@@ -386,7 +386,7 @@ fn marked(command: clap::Command) -> clap::Command {
                 .map(ToString::to_string)
                 .map(|help| match help.split_once('\n') {
                     // The lines of its keys follow, each with its own class.
-                    Some((first, keys)) if KeyedFlag::named(&name_of(&arg)).is_some() => {
+                    Some((first, keys)) if KeyedFlag::from_name(&name_of(&arg)).is_some() => {
                         format!("{first} [{class}]\n{keys}")
                     }
                     _ => format!("{help} [{class}]"),

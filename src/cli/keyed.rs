@@ -4,7 +4,7 @@ use clap::builder::PossibleValue;
 use clap::{Arg, ArgAction, Command};
 
 use crate::types::Decides;
-use crate::types::flags::{KEYED_FLAGS, KeyedFlag, spelled};
+use crate::types::flags::{KEYED_FLAGS, KeyedFlag, flag_spelling};
 
 /// The name of a flag in files, which is the name of the field.
 pub(super) fn name_of(arg: &Arg) -> String {
@@ -123,10 +123,10 @@ pub(super) fn respelled(text: &str) -> String {
     let mut text = text.to_owned();
     for (key, flag) in KEYED_FLAGS.iter().flat_map(|keyed| keyed.keys) {
         if !key.is_empty() {
-            let spelled = spelled(flag);
+            let spelling = flag_spelling(flag);
             text = text
-                .replace(&format!("'--{flag} <"), &format!("'{spelled}=<"))
-                .replace(&format!("'--{flag}'"), &format!("'{spelled}'"));
+                .replace(&format!("'--{flag} <"), &format!("'{spelling}=<"))
+                .replace(&format!("'--{flag}'"), &format!("'{spelling}'"));
         }
     }
     text

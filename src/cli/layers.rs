@@ -31,7 +31,7 @@ use super::keyed::{name_of, respelled};
 use crate::ask::OPENAI_KEY;
 use crate::error::{Error, Result};
 use crate::files::reading;
-use crate::types::text::near_name::{nearest, question, suggestion};
+use crate::types::text::near_name::{did_you_mean, nearest, suggestion};
 
 /// Prefix of this program's environment variables.
 const PREFIX: &str = "DARKQA_";
@@ -314,7 +314,7 @@ fn read_table(
                 continue;
             }
             let near = nearest(&flag, flags).map(|near| format!("--{near}"));
-            let hint = question(near.as_deref());
+            let hint = did_you_mean(near.as_deref());
             let problem = format_args!("there is no flag --{flag} here{hint}");
             return Err(Error::usage(origin, problem));
         }

@@ -30,7 +30,7 @@ use crate::run::{self, study};
 use crate::run_reports::report;
 use crate::runs::Outcome;
 use crate::types::manifests::Status;
-use crate::types::text::{shown, shown_in_colours};
+use crate::types::text::{escape_hidden, escape_hidden_except_styles};
 
 use command::{BatchCommand, Colours, Command, NAME, ReportCommand, ReportForm, StudyCommand};
 use layers::one_line;
@@ -234,12 +234,12 @@ fn manual(folder: &Path) -> Result<Outcome> {
 fn finish(outcome: &Outcome, verbosity: Verbosity, colours: ColorChoice) -> ExitCode {
     let mut stdout = AutoStream::new(std::io::stdout().lock(), colours);
     let said = if verbosity == Verbosity::Normal || outcome.written.is_empty() {
-        stdout.write_all(shown_in_colours(&outcome.output).as_bytes())
+        stdout.write_all(escape_hidden_except_styles(&outcome.output).as_bytes())
     } else {
         // An incomplete run is reported on standard error, so that standard output has the paths alone. Nothing there has colours.
         if outcome.status != Status::Complete {
             let mut stderr = AutoStream::never(std::io::stderr());
-            let _ = stderr.write_all(shown_in_colours(&outcome.output).as_bytes());
+            let _ = stderr.write_all(escape_hidden_except_styles(&outcome.output).as_bytes());
         }
         outcome
             .written
@@ -258,7 +258,7 @@ fn finish(outcome: &Outcome, verbosity: Verbosity, colours: ColorChoice) -> Exit
 
 /// The one place where an error reaches the user, if standard error is still read by somebody.
 fn fail(problem: &str) -> ExitCode {
-    let _ = writeln!(std::io::stderr(), "error: {}", shown(problem));
+    let _ = writeln!(std::io::stderr(), "error: {}", escape_hidden(problem));
     ExitCode::from(FATAL)
 }
 

@@ -18,7 +18,7 @@ use crate::run::evaluate::{EvaluateArgs, ShrinkArgs};
 use crate::run::openeqa::{JudgeArgs, OpenEqaArgs};
 use crate::run::synthesize::Sheet;
 use crate::types::degradations::Kind;
-use crate::types::flags::spelled;
+use crate::types::flags::flag_spelling;
 use crate::types::{AxisLevel, SetLight};
 use darkqa_enhance::{EnhancerArgs, ProbeArgs, RuntimeArgs, SizeArgs};
 use darkqa_light::{CameraArgs, LightArgs, SensorArgs};
@@ -156,7 +156,7 @@ impl NoEffect {
         let idle: Vec<String> = flags
             .iter()
             .filter(|id| self.typed.remove(*id))
-            .map(|id| spelled(&id.replace('_', "-")))
+            .map(|id| flag_spelling(&id.replace('_', "-")))
             .collect();
         if !idle.is_empty() {
             self.lines

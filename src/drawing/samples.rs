@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::text::words::light;
 use crate::types::degradations::Axis;
-use crate::types::text::shown;
+use crate::types::text::escape_hidden;
 use crate::types::{AxisLevel, Condition, EnhancerName, FrameId, RunGroup, Thumbnail, Variant};
 
 /// The samples of one axis.
@@ -47,7 +47,7 @@ pub(crate) fn samples(thumbnails: &[Thumbnail]) -> Vec<SamplePage> {
     .filter_map(|on| {
         let all: Vec<&Thumbnail> = thumbnails
             .iter()
-            .filter(|of| of.condition.level().is_shown_on(on))
+            .filter(|of| of.condition.level().belongs_to(on))
             .collect();
         axis_page(&all, on)
     })
@@ -69,11 +69,10 @@ fn axis_page(thumbnails: &[&Thumbnail], axis: Axis) -> Option<SamplePage> {
         for (variant, enhancer) in &lines {
             let is_shown = |condition: &Condition, at: AxisLevel| {
                 condition.level() == at
-                    && (condition.kind_reading() == *variant
-                        && condition.enhancer.as_ref() == *enhancer
+                    && (condition.variant() == *variant && condition.enhancer.as_ref() == *enhancer
                         || at == AxisLevel::L0
                             && condition.enhancer.as_ref() == *enhancer
-                            && RunGroup::meet(condition.group.as_ref(), variant.group.as_ref()))
+                            && RunGroup::overlap(condition.group.as_ref(), variant.group.as_ref()))
             };
             let images = levels.iter().map(|at| {
                 let thumbnail = thumbnails
@@ -110,7 +109,7 @@ fn axis_page(thumbnails: &[&Thumbnail], axis: Axis) -> Option<SamplePage> {
 fn lines<'a>(thumbnails: &[&'a Thumbnail]) -> BTreeSet<(Variant, Option<&'a EnhancerName>)> {
     let all = thumbnails
         .iter()
-        .map(|t| (t.condition.kind_reading(), t.condition.enhancer.as_ref()));
+        .map(|t| (t.condition.variant(), t.condition.enhancer.as_ref()));
     let (mut lines, clean): (BTreeSet<_>, BTreeSet<_>) =
         all.partition(|(variant, _)| variant.is_degraded());
     for (_, enhancer) in clean {
@@ -166,7 +165,7 @@ pub(crate) fn figure(samples: &SamplePage) -> String {
 
 /// Text with the special characters of XML escaped.
 fn escaped(text: &str) -> String {
-    shown(text)
+    escape_hidden(text)
         .replace('&', "&amp;")
         .replace('<', "&lt;")
         .replace('>', "&gt;")

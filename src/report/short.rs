@@ -201,12 +201,7 @@ fn accuracy_table(report: &ChoiceReport<'_>) -> String {
     let longest_name = rows.iter().map(|row| row.name.chars().count()).max();
     let longest_title = rows.iter().map(|row| row.block.chars().count()).max();
     let most_levels = Axis::ALL
-        .map(|axis| {
-            levels
-                .iter()
-                .filter(|level| level.is_shown_on(axis))
-                .count()
-        })
+        .map(|axis| levels.iter().filter(|level| level.belongs_to(axis)).count())
         .into_iter()
         .max()
         .unwrap_or_default();
@@ -249,7 +244,7 @@ fn accuracy_table(report: &ChoiceReport<'_>) -> String {
             let levels: Vec<AxisLevel> = levels
                 .iter()
                 .copied()
-                .filter(|level| level.is_shown_on(axis))
+                .filter(|level| level.belongs_to(axis))
                 .collect();
             for levels in levels.chunks(MAX_LEVELS) {
                 text += &block_lines(report, &block, levels, &names);

@@ -5,7 +5,7 @@ use minijinja::{AutoEscape, Environment};
 use serde::Serialize;
 
 use crate::error::{Error, Result};
-use crate::types::text::shown;
+use crate::types::text::escape_hidden;
 
 /// Parts that several pages share, each with its placeholder in the templates.
 const PARTS: [(&str, &str); 3] = [
@@ -33,5 +33,5 @@ pub(super) fn filled(template: &str, values: impl Serialize) -> Result<String> {
         .map_err(|e| failed(&e))?;
     let template = environment.get_template("page").map_err(|e| failed(&e))?;
     let page = template.render(Serde(values)).map_err(|e| failed(&e))?;
-    Ok(shown(&page).into_owned())
+    Ok(escape_hidden(&page).into_owned())
 }

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use crate::error::{Error, Result};
 use crate::runs::shard_records::{append_records, latest_trials};
 use crate::store::{self, Store};
-use crate::types::flags::spelled_setting;
+use crate::types::flags::setting_spelling;
 use crate::types::manifests::{RunManifest, differences};
 use crate::types::{FrameId, TextPlace, TrialKey};
 use darkqa_score::answers::record::Detail;
@@ -45,7 +45,7 @@ impl OtherShards {
             if let Some((field, before, now)) =
                 differences(&other.identity, &manifest.identity).next()
             {
-                let field = spelled_setting(field);
+                let field = setting_spelling(field);
                 return wrong(format!(
                     "this part is of another run: its {field} is {before}, now it is {now}; use another --out, or the same {field}"
                 ));

@@ -124,7 +124,7 @@ impl<T> TableBuilder<T> {
         for column in listing.columns() {
             let head = format!("csv {}", column.word());
             self = self.column(Text, &*head, |row| {
-                let fact = listing.fact(*column, &of(row).model);
+                let fact = listing.cell(*column, &of(row).model);
                 TableCell::from(
                     Some(fact)
                         .filter(|fact| !fact.is_empty())

@@ -7,7 +7,7 @@ use serde::{Serialize, Serializer};
 
 use crate::error::{Error, Result};
 use crate::text::table::{SUMMARY, Table, TableCell};
-use crate::types::text::{is_hidden, written_out};
+use crate::types::text::{escape_where, is_hidden};
 
 /// One field of a row. A number has as many digits as are needed to read it back without loss.
 #[derive(Debug, Clone, Copy, Serialize)]
@@ -74,7 +74,7 @@ pub(crate) fn fields(cell: &TableCell, names: usize) -> impl Iterator<Item = Csv
 /// written as `⟨U+001B⟩`; line breaks stay.
 pub(crate) fn safe(text: &str) -> Cow<'_, str> {
     // A tab within a cell moves some readers to the next.
-    let shown = written_out(text, |c| c == '\t' || is_hidden(c));
+    let shown = escape_where(text, |c| c == '\t' || is_hidden(c));
     if begins_formula(text) {
         Cow::Owned(format!("'{shown}"))
     } else {

@@ -114,14 +114,14 @@ impl<'a, C> Ladder<'a, C> {
         let words = series.light(self.pairs);
         match self.set {
             SetLight::Lit => words,
-            SetLight::Dark => words.replacen("untouched", self.set.untouched(), 1),
+            SetLight::Dark => words.replacen("untouched", self.set.l0_label(), 1),
         }
     }
 
     /// The name of a level at the head of a column.
     pub(crate) fn head(&self, level: AxisLevel) -> String {
         match level {
-            AxisLevel::L0 => self.set.untouched().to_owned(),
+            AxisLevel::L0 => self.set.l0_label().to_owned(),
             level => level.to_string(),
         }
     }
@@ -145,7 +145,7 @@ impl<'a, C> Ladder<'a, C> {
                 .filter(|(other, _)| {
                     let groups = [other, &series].map(|series| series.variant.group.as_ref());
                     (other.model, other.enhancer) == (series.model, series.enhancer)
-                        && RunGroup::meet(groups[0], groups[1])
+                        && RunGroup::overlap(groups[0], groups[1])
                 })
                 .peekable();
             if same_model.peek().is_some() {
@@ -169,7 +169,7 @@ impl<'a, C> Ladder<'a, C> {
                 let levels = self.levels.iter().copied();
                 let ladder = Self {
                     models: self.models.clone(),
-                    levels: levels.filter(|level| level.is_shown_on(axis)).collect(),
+                    levels: levels.filter(|level| level.belongs_to(axis)).collect(),
                     series: series
                         .map(|(series, cells)| (series.clone(), cells.clone()))
                         .collect(),
@@ -190,7 +190,7 @@ impl<'a, C> Ladder<'a, C> {
             let groups = [*other, series].map(|series| series.variant.group.as_ref());
             (other.model, other.enhancer) == (series.model, None)
                 && (other.variant == series.variant
-                    || is_clean && RunGroup::meet(groups[0], groups[1]))
+                    || is_clean && RunGroup::overlap(groups[0], groups[1]))
         });
         let mut cells = self
             .series
@@ -256,10 +256,10 @@ impl<'a, C> Ladder<'a, C> {
             let head = column.head();
             let heads = format!("page {head} | terminal {head} | latex {head}");
             table = table.column(Text, &*heads, |line| {
-                listing.fact(*column, line.model()).to_owned()
+                listing.cell(*column, line.model()).to_owned()
             });
         }
-        table.foot(listing.foot(self.models.iter().copied()))
+        table.foot(listing.footnote(self.models.iter().copied()))
     }
 }
 

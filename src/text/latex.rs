@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use crate::text::table::{Column, ColumnKind, Table, TableCell, TableFormat};
 use crate::text::words::{interval, percent, points, words};
-use crate::types::text::shown;
+use crate::types::text::escape_hidden;
 use darkqa_score::estimate::Estimate;
 use darkqa_score::significance::Significance;
 
@@ -33,7 +33,7 @@ pub(crate) fn tables(head: &str, findings: &[String], tables: &[Table]) -> Strin
 /// Text with the special characters of LaTeX escaped.
 pub(crate) fn escaped(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
-    for c in shown(text).chars() {
+    for c in escape_hidden(text).chars() {
         match c {
             '⟨' => escaped.push_str("$\\langle$"),
             '⟩' => escaped.push_str("$\\rangle$"),

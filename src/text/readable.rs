@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::types::text::shown;
+use crate::types::text::escape_hidden;
 
 /// Maximum number of characters of a text on a page.
 const MAX_CHARS: usize = 4_000;
@@ -13,7 +13,7 @@ const MAX_CHARS: usize = 4_000;
 pub(crate) fn readable(text: &str) -> String {
     let cut = text.char_indices().nth(MAX_CHARS);
     let kept = cut.map_or(text, |(at, _)| &text[..at]);
-    let mut visible = shown(kept).into_owned();
+    let mut visible = escape_hidden(kept).into_owned();
     let all = text.chars().count();
     if all > MAX_CHARS {
         let _ = write!(visible, " … ({all} characters, cut here)");

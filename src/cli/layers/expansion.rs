@@ -8,7 +8,7 @@ use clap::{Arg, ArgAction, Command};
 use super::layered_value::LayeredValue;
 use crate::cli::keyed::{name_of, with_value};
 use crate::error::{Error, Result};
-use crate::types::flags::{KEYED_FLAGS, KeyedFlag, KeyedSetting, spelled};
+use crate::types::flags::{KEYED_FLAGS, KeyedFlag, KeyedSetting, flag_spelling};
 
 /// The keyed flags of a command, and the hidden flags that their keys set.
 pub(super) struct Expansion<'a>(pub(super) &'a Command);
@@ -20,7 +20,7 @@ impl Expansion<'_> {
 
     /// The keyed flag with this name, if the command has it.
     fn keyed(&self, name: &str) -> Option<&'static KeyedFlag> {
-        let keyed = KeyedFlag::named(name)?;
+        let keyed = KeyedFlag::from_name(name)?;
         let is_used = keyed
             .keys
             .iter()
@@ -41,8 +41,8 @@ impl Expansion<'_> {
                 }
                 ([only], _) => Some(only.get_name().to_owned()),
                 _ => {
-                    let spelled = spelled(setting.flag);
-                    let key = spelled.rsplit(' ').next().unwrap_or_default();
+                    let spelling = flag_spelling(setting.flag);
+                    let key = spelling.rsplit(' ').next().unwrap_or_default();
                     let form = arg.map(|arg| with_value(key, arg)).unwrap_or_default();
                     return Err(format!("{key} has no value; write {form}"));
                 }
@@ -110,7 +110,7 @@ impl Expansion<'_> {
             "true" | "yes" | "1" => Ok(Some(format!("--{flag}").into())),
             "false" | "no" | "0" => Ok(None),
             _ => {
-                let key = spelled(flag);
+                let key = flag_spelling(flag);
                 let key = key.rsplit(' ').next().unwrap_or_default();
                 let problem = format!("{key} takes true or false, not {value:?}");
                 Err(Error::usage(format!("--{name}"), problem))
@@ -165,7 +165,7 @@ impl Expansion<'_> {
             Some(known) => {
                 let problem = format!(
                     "{} is set twice, by {} too",
-                    spelled(setting.flag),
+                    flag_spelling(setting.flag),
                     known.origin
                 );
                 return Err(Error::usage(origin, problem));

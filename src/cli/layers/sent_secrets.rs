@@ -9,7 +9,7 @@ use std::path::Path;
 use super::layered_value::LayeredValue;
 use crate::ask::{BaseUrl, OPENAI_KEY, vendor_variables};
 use crate::error::{Error, Result};
-use crate::types::flags::spelled;
+use crate::types::flags::flag_spelling;
 
 /// The flags that say where requests go, or who may read them on their way.
 const ADDRESSES: [&str; 3] = ["base-url", "judge-base-url", "ca-file"];
@@ -58,7 +58,7 @@ pub(super) fn check(
         let problem = format!(
             "the file sets --{address}, too, so that {what} could be sent to an unknown server; name it on the command line with \
              {}, or remove --{address} from the file",
-            spelled(flag)
+            flag_spelling(flag)
         );
         Err(Error::usage(&value.origin, problem))
     };

@@ -7,7 +7,7 @@ use clap::CommandFactory as _;
 
 use super::*;
 use crate::cli::{Cli, command};
-use crate::types::flags::spelled;
+use crate::types::flags::flag_spelling;
 
 /// The command line, made once for all calls.
 static COMMAND: LazyLock<Command> = LazyLock::new(command::command);
@@ -411,7 +411,7 @@ fn a_file_sends_nothing_of_the_user_to_an_address_of_its_own() {
         let words: Vec<&str> = words.split_whitespace().collect();
         let flag = line.split(' ').next().unwrap();
         let problem = parsed(&words, &[], &format!("{own}{line}\n")).unwrap_err();
-        let named = format!("name it on the command line with {}", spelled(flag));
+        let named = format!("name it on the command line with {}", flag_spelling(flag));
         assert!(
             problem.contains(&named) && problem.contains("--base-url"),
             "{line}: {problem}"

@@ -112,7 +112,7 @@ impl Overview<'_> {
             .levels
             .iter()
             .copied()
-            .filter(|level| level.is_shown_on(axis))
+            .filter(|level| level.belongs_to(axis))
             .filter(|level| rows.iter().any(|(_, cells)| cells.contains_key(level)))
             .collect();
         let rows = rows

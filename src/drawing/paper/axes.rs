@@ -134,7 +134,7 @@ mod tests {
 
     /// Names of the labelled levels of an axis with L0 and these drops in hundredths of an EV.
     fn labelled(drops: impl IntoIterator<Item = u16>) -> Vec<String> {
-        let of = |drop| AxisLevel::new(Kind::Sensor, Severity::hundredths(drop));
+        let of = |drop| AxisLevel::new(Kind::Sensor, Severity::from_hundredths(drop));
         let drops = drops.into_iter().map(of);
         let levels: Vec<AxisLevel> = std::iter::once(AxisLevel::L0).chain(drops).collect();
         let axes = Axes {

@@ -200,7 +200,7 @@ mod tests {
 
     /// A chart of one panel with `curves` lines over L0, L1 and L5, and chance.
     fn chart(curves: usize) -> Chart {
-        let level = |drop| AxisLevel::new(Kind::Sensor, Severity::hundredths(drop));
+        let level = |drop| AxisLevel::new(Kind::Sensor, Severity::from_hundredths(drop));
         let levels = [AxisLevel::L0, level(200), level(900)];
         let mut lines: Vec<PlotLine> = (0..curves)
             .map(|line| PlotLine {

@@ -92,7 +92,7 @@ impl<'a> Stored<'a> {
                 .filter(|of| of.frame == *frame)
                 .filter(|of| {
                     of.condition.enhancer.is_none()
-                        && (of.condition.kind_reading() == *self.variant
+                        && (of.condition.variant() == *self.variant
                             || of.condition.level() == AxisLevel::L0)
                 })
                 .map(|of| of.condition.level())
@@ -121,7 +121,7 @@ impl<'a> Stored<'a> {
             of.frame == *frame
                 && condition.level() == level
                 && condition.enhancer.as_ref() == enhancer
-                && (level == AxisLevel::L0 || condition.kind_reading() == *self.variant)
+                && (level == AxisLevel::L0 || condition.variant() == *self.variant)
         })
     }
 }

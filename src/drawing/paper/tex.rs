@@ -9,7 +9,7 @@ use super::sheet::{Colour, Stroke};
 use crate::drawing::chart::{Chart, Panel, PanelContent, PlotLine};
 use crate::text::latex::escaped;
 use crate::types::AxisLevel;
-use crate::types::text::shown;
+use crate::types::text::escape_hidden;
 
 /// Room left of the first axes, between axes, and right of the last ones, in heights of letters.
 const FIRST: f64 = 4.6;
@@ -230,7 +230,7 @@ fn dat(panel: &Panel) -> String {
         .collect();
     for (place, line, _) in &curves {
         let name = line.name.replace(['\n', '\r'], " ");
-        let name = shown(&name);
+        let name = escape_hidden(&name);
         let _ = writeln!(
             text,
             "# y{place}, low{place}, high{place}: {name}, in percent"

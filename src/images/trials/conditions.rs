@@ -20,7 +20,7 @@ pub(crate) fn conditions(
     let photographs = photographs.iter().cloned().map(PairDark::Photograph);
     let pairs = light.matches.iter().cloned().chain(photographs);
     for treatment in degradations.chain(pairs.map(Treatment::Paired)) {
-        let is_enhanced = on.has(&treatment);
+        let is_enhanced = on.includes(&treatment);
         let raw = Condition::raw(treatment);
         let enhanced = |name: &EnhancerName| Condition {
             enhancer: Some(name.clone()),
@@ -47,16 +47,16 @@ pub(crate) fn check_used(light: &LightSettings, args: &EnhancerArgs) -> Result<(
         let kind = degradation.as_ref().map(Degradation::kind);
         TreatmentSet::only(kind)
     });
-    let Some(asked) = treatments.reduce(TreatmentSet::or) else {
+    let Some(asked) = treatments.reduce(TreatmentSet::union) else {
         return Ok(());
     };
     let on = args.on();
     // Whether there are photographs in the dark is known when the data are open.
-    let may_be = on.and(TreatmentSet::DARK).is_some() || !light.matches.is_empty();
-    if args.is_empty() || may_be || asked.and(on).is_some() {
+    let may_be = on.intersection(TreatmentSet::DARK).is_some() || !light.matches.is_empty();
+    if args.is_empty() || may_be || asked.intersection(on).is_some() {
         return Ok(());
     }
-    let problem = match asked.and(light.variants.into()) {
+    let problem = match asked.intersection(light.variants.into()) {
         None => "only L0 is asked; --llie-on l0 enhances the untouched images".to_owned(),
         Some(dark) => {
             format!("--llie-on {on} is not among the images asked; --llie-on {dark} is")

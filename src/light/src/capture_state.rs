@@ -178,7 +178,7 @@ impl CaptureState {
 
 /// The severity of a drop with two decimals at most, for which the exposure branch has an exact table.
 fn exact_severity(drop_ev: f64) -> Option<Severity> {
-    let severity = Severity::hundredths((100.0 * drop_ev).round() as u16);
+    let severity = Severity::from_hundredths((100.0 * drop_ev).round() as u16);
     (severity.value().to_bits() == drop_ev.to_bits()).then_some(severity)
 }
 

@@ -34,7 +34,7 @@ use crate::text::alert::Alert;
 use crate::text::noise_profiles::NoiseProfiles;
 use crate::text::table::Table;
 use crate::types::Truths;
-use crate::types::flags::spelled_setting;
+use crate::types::flags::setting_spelling;
 use crate::types::manifests::RunManifest;
 use darkqa_score::answers::confusion::Confusion;
 use darkqa_score::grid::Grid;
@@ -315,7 +315,7 @@ fn settings(manifest: &RunManifest) -> Vec<(String, String)> {
         .platform
         .iter()
         .map(|(name, value)| (name.clone(), value.clone()))
-        .chain(known.map(|(name, value)| (spelled_setting(name), setting_text(value))))
+        .chain(known.map(|(name, value)| (setting_spelling(name), setting_text(value))))
         .chain(columns(manifest))
         .collect()
 }
@@ -332,7 +332,7 @@ fn columns(manifest: &RunManifest) -> Vec<(String, String)> {
             let fields = content.as_object().into_iter().flatten();
             let set: Vec<String> = fields
                 .filter(|(_, value)| !value.is_null())
-                .map(|(name, value)| format!("{} {}", spelled_setting(name), setting_text(value)))
+                .map(|(name, value)| format!("{} {}", setting_spelling(name), setting_text(value)))
                 .collect();
             rows.push(fact(&format!("{column} {value}"), set.join(", ")));
         }

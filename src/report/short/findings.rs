@@ -9,7 +9,7 @@ use crate::text::alert::{Alert, lines};
 use crate::text::terminal::line;
 use crate::text::words::counted;
 use crate::text::wrapped::wrapped;
-use crate::types::text::shown;
+use crate::types::text::escape_hidden;
 
 /// Width of the column of groups, in characters.
 const GROUP: usize = 15;
@@ -58,7 +58,7 @@ fn row(title: &str, finding: &Finding<'_>) -> String {
     let tone = finding.shown().tone;
     let first = format!(" {title:<GROUP$}{}  ", tone.sign());
     let rest = " ".repeat(first.chars().count());
-    let lines = wrapped(&first, &shown(&(finding.text() + ".")), &rest);
+    let lines = wrapped(&first, &escape_hidden(&(finding.text() + ".")), &rest);
     let text = marked::signed(&lines, GROUP + 2, tone);
     let intervals = finding.interval_words();
     if intervals.is_empty() {

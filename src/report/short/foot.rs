@@ -108,7 +108,7 @@ fn observer_control(report: &ChoiceReport<'_>) -> String {
 /// The meaning of the marks of models, and a line for each model with its further columns.
 pub(super) fn about_models(report: &ChoiceReport<'_>, models: &[&str]) -> String {
     let listing = &report.findings.grid.listing;
-    let foot = listing.foot(models.iter().copied());
+    let foot = listing.footnote(models.iter().copied());
     let mut text = foot.map_or_else(String::new, |foot| wrapped(" ", &foot, "   "));
     for (enhancer, training) in listing.trainings() {
         text += &wrapped(" ", &format!("{enhancer}: {training}"), "   ");
@@ -118,7 +118,7 @@ pub(super) fn about_models(report: &ChoiceReport<'_>, models: &[&str]) -> String
             .columns()
             .iter()
             .map(|column| {
-                let fact = Some(listing.fact(*column, model)).filter(|fact| !fact.is_empty());
+                let fact = Some(listing.cell(*column, model)).filter(|fact| !fact.is_empty());
                 format!("{} {}", column.head(), fact.unwrap_or("–"))
             })
             .collect();

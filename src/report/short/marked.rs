@@ -9,12 +9,12 @@ use super::foot::BELOW;
 use crate::sentences::{Sentence, Tone};
 use crate::text::alert::Alert;
 use crate::text::wrapped::wrapped;
-use crate::types::text::shown;
+use crate::types::text::escape_hidden;
 
 /// An alert, wrapped.
 pub(super) fn alert(alert: &Alert) -> String {
     marked(
-        &wrapped("! ", &shown(&alert.text), "  "),
+        &wrapped("! ", &escape_hidden(&alert.text), "  "),
         1,
         colour(AnsiColor::Yellow),
     )
@@ -23,8 +23,8 @@ pub(super) fn alert(alert: &Alert) -> String {
 /// A sentence with its sign, and its detail beneath.
 pub(super) fn sentence(sentence: &Sentence) -> String {
     let first = format!(" {}  ", sentence.tone.sign());
-    let text = wrapped(&first, &shown(&sentence.text), "    ");
-    signed(&text, 2, sentence.tone) + &wrapped("    ", &shown(&sentence.detail), "    ")
+    let text = wrapped(&first, &escape_hidden(&sentence.text), "    ");
+    signed(&text, 2, sentence.tone) + &wrapped("    ", &escape_hidden(&sentence.detail), "    ")
 }
 
 /// Lines whose sign ends at a column, in the colour of the tone.
@@ -39,7 +39,7 @@ pub(super) fn signed(lines: &str, end: usize, tone: Tone) -> String {
 
 /// The summary of a report, in bold.
 pub(super) fn summary(text: &str) -> String {
-    let lines = wrapped(" ", &shown(text), " ");
+    let lines = wrapped(" ", &escape_hidden(text), " ");
     let style = Style::new().bold();
     format!("{style}{}{style:#}\n", lines.trim_end())
 }
@@ -52,7 +52,7 @@ pub(super) fn heading(title: &str) -> String {
 /// A table with its marks of what is below the score without images in red.
 pub(super) fn table(text: &str) -> String {
     let style = colour(AnsiColor::Red);
-    shown(text).replace(BELOW, &format!("{style}{BELOW}{style:#}"))
+    escape_hidden(text).replace(BELOW, &format!("{style}{BELOW}{style:#}"))
 }
 
 fn colour(colour: AnsiColor) -> Style {

@@ -88,8 +88,8 @@ fn choice_answer(record: &Record) -> ShownAnswer {
         condition: record.condition.clone(),
         outcome: outcome_words::outcome(record),
         reply: reply_excerpt(record),
-        shown: record.detail.shown().clone(),
-        sent: record.detail.sent(),
+        shown: record.detail.sent_frame().clone(),
+        sent: record.detail.file_digest(),
     }
 }
 

@@ -346,7 +346,7 @@ mod tests {
     fn counts(levels: &[(u16, u32, u32)]) -> LevelCounts {
         let level = |drop: u16| match drop {
             0 => AxisLevel::L0,
-            drop => AxisLevel::new(Kind::Sensor, Severity::hundredths(drop)),
+            drop => AxisLevel::new(Kind::Sensor, Severity::from_hundredths(drop)),
         };
         let cluster =
             |&(_, right, replies): &(u16, u32, u32)| vec![ClusterCount { right, replies }; 12];

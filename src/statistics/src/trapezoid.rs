@@ -30,7 +30,7 @@ mod tests {
         assert_eq!(weights(&paper), [4, 8, 8, 7, 6, 3]);
         let odd = [
             AxisLevel::L0,
-            level(Severity::hundredths(330)),
+            level(Severity::from_hundredths(330)),
             level(Severity::L5),
         ];
         assert_eq!(weights(&odd), [11, 30, 19]);

@@ -18,7 +18,7 @@ use serde_json::Value;
 use darkqa_ground::error::{Error, Result};
 use darkqa_ground::files::folder_access::FolderAccess;
 use darkqa_ground::files::{self, is_unfinished, reading};
-use darkqa_ground::types::flags::spelled_setting;
+use darkqa_ground::types::flags::setting_spelling;
 use darkqa_ground::types::manifests::{
     ColumnDifference, Columns, JUDGES, RecordedNames, RunManifest, differences, judge_flag,
 };
@@ -344,7 +344,7 @@ pub fn check_same_run(
     };
     if let Some((field, before, after)) = differences(&stored.identity, &requested.identity).next()
     {
-        let field = spelled_setting(field);
+        let field = setting_spelling(field);
         return wrong(format!(
             "this run has another {field}: it was {before}, now it is {after}; use another --out, or the same {field}"
         ));
@@ -379,8 +379,8 @@ pub fn check_same_run(
         }
         let is_address = field == ADDRESS;
         let flag = match column {
-            JUDGES => spelled_setting(&judge_flag(&field)),
-            _ => spelled_setting(&field),
+            JUDGES => setting_spelling(&judge_flag(&field)),
+            _ => setting_spelling(&field),
         };
         // Nothing was asked at an address that gave no reply, such as a mistyped one.
         let is_allowed = address_change == AddressChange::Allowed;
@@ -417,7 +417,7 @@ fn has_reply(folder: &Path, stored: &RunManifest, model: &str) -> Result<bool> {
     let names = RecordedNames::from_manifest(stored);
     let mut has_reply = false;
     each_line(&folder.join(RECORDS), |trial: StoredTrial| {
-        has_reply |= !trial.failed() && names.shown(&trial.model) == model;
+        has_reply |= !trial.failed() && names.table_name(&trial.model) == model;
     })?;
     Ok(has_reply)
 }

@@ -170,7 +170,7 @@ impl<D: Detail> Store<D> {
         let mut trials = read_trials(&self.folder)?;
         let mut models = Distinct::default();
         for trial in &mut trials {
-            let name = self.names.shown(&trial.model);
+            let name = self.names.table_name(&trial.model);
             if *name != **trial.model {
                 trial.model = name.to_owned().into();
                 models.share(&mut trial.model);
@@ -182,7 +182,7 @@ impl<D: Detail> Store<D> {
     /// The records with the names that their models have now.
     fn shown(&self, mut records: Vec<Record<D>>) -> Vec<Record<D>> {
         for record in &mut records {
-            let name = self.names.shown(&record.model);
+            let name = self.names.table_name(&record.model);
             if name != record.model {
                 record.model = name.to_owned();
             }
@@ -192,7 +192,7 @@ impl<D: Detail> Store<D> {
 
     /// A record with the name that its model has in the file.
     fn recorded<'r>(&self, record: &'r Record<D>) -> Cow<'r, Record<D>> {
-        let name = self.names.recorded(&record.model);
+        let name = self.names.record_name(&record.model);
         if name == record.model {
             return Cow::Borrowed(record);
         }
