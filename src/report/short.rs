@@ -19,7 +19,7 @@ use crate::text::frame_count::frames;
 use crate::text::ladder::{Ladder, SeriesByLevel};
 use crate::text::noise_profiles::NoiseProfiles;
 use crate::text::terminal::render;
-use crate::text::words::{counted, percent, reach_of};
+use crate::text::words::{counted, percent, widest_reach_of};
 use crate::text::wrapped::{WIDTH, wrapped};
 use crate::types::manifests::RunManifest;
 use crate::types::{Axis, AxisLevel};
@@ -172,7 +172,7 @@ fn accuracy_table(report: &ChoiceReport<'_>) -> String {
     let summary = common.map_or(&report.findings.summary, |common| &common.summary);
     let cells = summary.family_cells(None, ReadingMode::Strict);
     let ladder = Ladder::new(cells.map(|cell| (&cell.subject, cell)))
-        .in_light_of(report.findings)
+        .with_pairs(report.findings)
         .with_clean();
     let mut models: Vec<&str> = ladder.series.keys().map(|series| series.model).collect();
     models.dedup();
@@ -280,7 +280,7 @@ fn block_lines(
             last_group = row.group;
             let _ = writeln!(text, " — {}", last_group.unwrap_or_default());
         }
-        let reach = reach_of(cells().flatten().filter_map(|cell| cell.accuracy));
+        let reach = widest_reach_of(cells().flatten().filter_map(|cell| cell.accuracy));
         text += &names.line(
             &row.name,
             cells().map(|cell| accuracy_text(report, cell)),

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::error::Result;
-use crate::text::script::embedded;
+use crate::text::script::to_script_json;
 use crate::types::Digest;
 
 /// The template of the page.
@@ -61,7 +61,7 @@ pub(crate) fn page(items: &[StudyQuestion]) -> Result<String> {
         std::iter::once(item.id.as_bytes()).chain(shots)
     });
     let set = Digest::from_parts(names);
-    Ok(PAGE.replacen(PLACEHOLDER, &embedded(&StudyPage { set, items })?, 1))
+    Ok(PAGE.replacen(PLACEHOLDER, &to_script_json(&StudyPage { set, items })?, 1))
 }
 
 #[cfg(test)]

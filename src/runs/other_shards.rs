@@ -102,8 +102,8 @@ impl OtherShards {
             .collect();
         append_records(store, manifest, &shards, found.iter().copied())?;
         let folders: Vec<&Path> = shards.iter().map(|(folder, _)| *folder).collect();
-        store.add_thumbnails_of(&folders, |frame| sources.contains(frame))?;
-        store.add_fidelity_of(&folders, |frame| sources.contains(frame))?;
+        store.add_thumbnails_from(&folders, |frame| sources.contains(frame))?;
+        store.add_fidelity_from(&folders, |frame| sources.contains(frame))?;
         store.sync()?;
         Ok(found.len())
     }

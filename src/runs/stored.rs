@@ -300,7 +300,7 @@ fn list_runs(folder: &Path) -> Vec<String> {
         .flatten()
         .flatten()
         .map(|entry| entry.path())
-        .filter(|path| store::holds_run(path))
+        .filter(|path| store::is_run(path))
         .map(|path| path.display().to_string())
         .collect();
     runs.sort();

@@ -1,4 +1,4 @@
-//! Replies of models as text that a page can show: [`readable`].
+//! Replies of models as text for an HTML page: [`readable`].
 
 use std::fmt::Write;
 
@@ -7,8 +7,7 @@ use crate::types::text::escape_hidden;
 /// Maximum number of characters of a text on a page.
 const MAX_CHARS: usize = 4_000;
 
-/// A text in which hidden characters are written as ⟨U+202E⟩: controls, direction marks and invisible characters. A text of
-/// more than [`MAX_CHARS`] characters is cut, with a note at its end.
+/// Escapes hidden characters as codes such as ⟨U+202E⟩, and cuts a text of more than [`MAX_CHARS`] characters, with a note at its end.
 #[must_use]
 pub(crate) fn readable(text: &str) -> String {
     let cut = text.char_indices().nth(MAX_CHARS);
@@ -26,7 +25,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn hidden_characters_are_written_out_and_long_texts_cut() {
+    fn hidden_characters_are_escaped_and_long_texts_cut() {
         assert_eq!(readable("a\u{202e}b\u{0}\n"), "a⟨U+202E⟩b⟨U+0000⟩\n");
         let long = readable(&"ü".repeat(MAX_CHARS + 1));
         assert!(long.ends_with("ü … (4001 characters, cut here)"));

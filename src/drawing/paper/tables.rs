@@ -9,7 +9,7 @@ use std::ops::Range;
 
 use super::font::Font;
 use super::look::Look;
-use crate::text::latex::{MOST_ROWS, escaped};
+use crate::text::latex::{MAX_ROWS, escape};
 use crate::text::table::{Column, ColumnKind, Table, TableCell, TableFormat, TableRow};
 use crate::text::words::{interval, words};
 
@@ -54,7 +54,7 @@ struct Form {
 /// forty rows.
 pub(crate) fn tables(all: &[Table], look: &Look, is_wide: bool) -> (Vec<(String, Vec<u8>)>, usize) {
     let (long, short): (Vec<&Table>, Vec<&Table>) =
-        all.iter().partition(|table| table.rows.len() > MOST_ROWS);
+        all.iter().partition(|table| table.rows.len() > MAX_ROWS);
     let float = if is_wide { "table*" } else { "table" };
     let mut text =
         format!("% Tables of darkqa-eval. In the preamble: \\usepackage{{booktabs}}\n{COMMANDS}");
@@ -241,7 +241,7 @@ fn name_text(row: &TableRow, room: f64) -> String {
 
 /// Text of LaTeX.
 fn text(plain: &str) -> String {
-    escaped(plain)
+    escape(plain)
         .replace('–', "--")
         .replace('↓', "$\\downarrow$")
 }

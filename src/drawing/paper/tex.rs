@@ -7,7 +7,7 @@ use super::legend::Legend;
 use super::look::Look;
 use super::sheet::{Colour, Stroke};
 use crate::drawing::chart::{Chart, Panel, PanelContent, PlotLine};
-use crate::text::latex::escaped;
+use crate::text::latex::escape;
 use crate::types::AxisLevel;
 use crate::types::text::escape_hidden;
 
@@ -76,7 +76,7 @@ pub(crate) fn tex(name: &str, chart: &Chart, look: &Look) -> Vec<(String, Vec<u8
                 // Later panels have no legend of their own: a name that they add stands in theirs.
                 let room = (look.width - SAMPLE) / WIDER;
                 let entry = Font::bundled().shortened(&line.name, look.letters, room);
-                let _ = writeln!(text, "\\addlegendentry{{{}}}", escaped(&entry));
+                let _ = writeln!(text, "\\addlegendentry{{{}}}", escape(&entry));
             }
         }
         files.push((data, dat(panel).into_bytes()));
@@ -124,9 +124,9 @@ fn head(panel: &Panel, measure: &str) -> String {
     format!(
         "\\nextgroupplot[title={{{}}}, xlabel={{{}}}, ylabel={{{}}}, xmin={}, xmax={},\n  xtick={{{}}}, xticklabels={{{}}}, \
          xticklabel style={{align=center}}",
-        escaped(&panel.title),
-        escaped(&panel.axis_title()),
-        escaped(measure),
+        escape(&panel.title),
+        escape(&panel.axis_title()),
+        escape(measure),
         -0.035 * panel.farthest(),
         1.035 * panel.farthest(),
         ticks.join(","),

@@ -24,7 +24,7 @@ pub(in crate::report) fn findings(
 ) -> String {
     let mut text = match length {
         // As wide as the tables.
-        ReportLength::Full => line(["", head, " "]) + &lines(alerts),
+        ReportLength::Full => line("", head, " ") + &lines(alerts),
         _ => format!("{head}\n") + &alerts.iter().map(marked::alert).collect::<String>(),
     };
     if groups.count() == 0 {

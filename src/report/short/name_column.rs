@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::text::words::shortened;
+use crate::text::words::shorten_middle;
 
 /// Width of the column of a level, in characters.
 pub(super) const LEVEL: usize = 7;
@@ -21,7 +21,7 @@ impl NameColumn {
         let mut seen = BTreeSet::new();
         let alike = names
             .into_iter()
-            .map(|name| shortened(name, width))
+            .map(|name| shorten_middle(name, width))
             .filter(|name| !seen.insert(name.clone()))
             .collect();
         Self { width, alike }
@@ -34,7 +34,8 @@ impl NameColumn {
         values: impl Iterator<Item = String>,
         reach: &str,
     ) -> String {
-        let (width, mut text, mut short) = (self.width, String::new(), shortened(name, self.width));
+        let (width, mut text, mut short) =
+            (self.width, String::new(), shorten_middle(name, self.width));
         if self.alike.contains(&short) {
             text = format!(" {name}\n");
             short.clear();

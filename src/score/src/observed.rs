@@ -207,7 +207,7 @@ fn cell(
     let max_weight = n as f64 / f64::max(evidence as f64, 1.0);
     Some(ObserverCell {
         subject,
-        score: Estimate::scored(&sums, max_weight, n)?,
+        score: Estimate::from_scores(&sums, max_weight, n)?,
         chance: guesses / n as f64,
         evidence: evidence as f64 / n as f64,
         seen: sum(|frame| frame.seen) as f64 / things,

@@ -1,4 +1,5 @@
-//! Readers of folders ([`entries`]), files ([`open`]), text files ([`text`], [`settings`]) and files of one JSON object a line ([`json_lines`]).
+//! Readers of folders ([`entries`]), files ([`open`]), text files ([`text`], [`settings`]) and files of one JSON object a line
+//! ([`json_lines`]).
 //!
 //! Each reader has a size limit and refuses pipes and devices: a downloaded data set may contain a link to `/dev/zero`, which would fill
 //! the memory, or a pipe, which would block for ever.

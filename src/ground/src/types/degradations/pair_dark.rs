@@ -29,8 +29,8 @@ impl PhotoName {
     /// Checks a name. It is used as the name of a condition, so it must differ from all other conditions.
     ///
     /// # Errors
-    /// If it does not begin with a lower-case letter, has other characters than lower-case letters, digits, `_`, `-` and `.`, is longer than
-    /// 40 characters, or is the name of another condition.
+    /// If it does not begin with a lower-case letter, has other characters than lower-case letters, digits, `_`, `-` and `.`, is longer
+    /// than 40 characters, or is the name of another condition.
     pub fn new(name: &str) -> Result<Self, Error> {
         if !name.starts_with(|c: char| c.is_ascii_lowercase())
             || !name
