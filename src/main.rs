@@ -16,8 +16,8 @@ fn main() -> ExitCode {
     cli::main(std::env::args_os())
 }
 
-/// Limits glibc to one heap per core. By default it opens up to eight, and each keeps the memory of images that it once held: 48 frames
-/// on two cores take 680 MB then, and 330 MB with two heaps.
+/// Limits glibc to one heap per core. By default it opens up to eight heaps per core, and each keeps the memory of images that it once
+/// held. With the default, 48 frames on two cores take 680 MB; with two heaps they take 330 MB.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 #[expect(unsafe_code, reason = "a switch of the C library")]
 fn limit_heaps() {

@@ -142,7 +142,7 @@ fn result(line: &Value, scrub: &Scrub) -> Result<Reply, Failure> {
 pub(crate) fn with_letter(reply: Reply, constrain: Constrain, choices: usize) -> Reply {
     Reply {
         text: constrained_letter(constrain, choices, &reply.text).unwrap_or(reply.text),
-        finish: reply.finish.shortened(),
+        finish: reply.finish.shorten(),
         ..reply
     }
 }

@@ -31,7 +31,7 @@ use crate::run_reports::ReportArgs;
 use crate::types::Decides;
 use crate::types::flags::KeyedFlag;
 
-use super::keyed::{grouped, name_of};
+use super::keyed::{name_of, with_keyed_flags};
 
 pub(super) const NAME: &str = "darkqa-eval";
 
@@ -299,9 +299,9 @@ pub(crate) enum StudyCommand {
     Read(study::ReadArgs),
 }
 
-/// The command line, with keyed flags, short forms, and the class of each flag at the end of its help, such as `[pixels]`.
+/// The command line with keyed flags and short forms. The help of each flag ends with its class, such as `[pixels]`.
 pub(super) fn command() -> clap::Command {
-    let root = marked(with_other_forms(grouped(Cli::command())));
+    let root = with_classes(with_other_forms(with_keyed_flags(Cli::command())));
     let shared: Vec<Arg> = root.get_arguments().cloned().collect();
     let root = ON_EVALUATIONS.into_iter().fold(root, |root, name| {
         root.mut_subcommand(name, |command| on_evaluation(command, &shared))
@@ -309,7 +309,7 @@ pub(super) fn command() -> clap::Command {
     first_heading_first(with_rare_openeqa_flags_hidden(root, true))
 }
 
-/// The command line for manual pages, which leave out what `-h` leaves out: they list the rare flags of `openeqa`.
+/// The command line for manual pages. They leave out what `-h` leaves out, but list the rare flags of `openeqa`.
 pub(super) fn command_for_manual() -> clap::Command {
     with_rare_openeqa_flags_hidden(command(), false)
 }
@@ -327,7 +327,7 @@ fn with_rare_openeqa_flags_hidden(root: clap::Command, is_hidden: bool) -> clap:
     })
 }
 
-/// The command and those in it, with the short form and the second name of each flag that has one.
+/// The command and those in it, with short forms and second names of their flags.
 pub(super) fn with_other_forms(command: clap::Command) -> clap::Command {
     command
         .mut_args(|mut arg| {
@@ -345,10 +345,12 @@ pub(super) fn with_other_forms(command: clap::Command) -> clap::Command {
         .mut_subcommands(with_other_forms)
 }
 
-/// A command that takes the flags of an evaluation, or whose subcommands do: `-h` leaves out those that mean the same there.
+/// A command that takes the flags of an evaluation, or whose subcommands do. Its `-h` leaves out the flags that mean the same as there.
 fn on_evaluation(command: clap::Command, shared: &[Arg]) -> clap::Command {
-    let takes_models = |arg: &Arg| arg.get_long() == Some("model");
-    if !command.get_arguments().any(takes_models) {
+    if !command
+        .get_arguments()
+        .any(|arg| arg.get_long() == Some("model"))
+    {
         return command.mut_subcommands(|inner| on_evaluation(inner, shared));
     }
     command
@@ -361,8 +363,8 @@ fn on_evaluation(command: clap::Command, shared: &[Arg]) -> clap::Command {
         })
 }
 
-/// The command with the flags under [`FIRST_HEADING`] first: help lists headings in the order of their flags, and a flag that is changed
-/// moves to the end.
+/// The command with the flags under [`FIRST_HEADING`] first. Help lists headings in the order of their flags, and a flag that is changed
+/// moves to the end. So every other flag is changed.
 fn first_heading_first(command: clap::Command) -> clap::Command {
     let others: Vec<Id> = command
         .get_arguments()
@@ -374,28 +376,28 @@ fn first_heading_first(command: clap::Command) -> clap::Command {
         .fold(command, |command, id| command.mut_arg(id, |arg| arg))
 }
 
-fn marked(command: clap::Command) -> clap::Command {
-    let mark = |arg: Arg| {
-        let class = Decides::from_arg(&arg).filter(|class| *class != Decides::Nothing);
-        let Some(class) = class.map(Decides::word) else {
-            return arg;
-        };
-        let help = arg.get_help().map(|help| format!("{help} [{class}]"));
-        let long =
-            arg.get_long_help()
-                .map(ToString::to_string)
-                .map(|help| match help.split_once('\n') {
-                    // The lines of its keys follow, each with its own class.
-                    Some((first, keys)) if KeyedFlag::named(&name_of(&arg)).is_some() => {
-                        format!("{first} [{class}]\n{keys}")
-                    }
-                    _ => format!("{help} [{class}]"),
-                });
-        let arg = arg.help(help.unwrap_or_default());
-        match long {
-            Some(long) => arg.long_help(long),
-            None => arg,
-        }
+/// The command and those in it, with the class of each flag that decides something at the end of its help.
+fn with_classes(command: clap::Command) -> clap::Command {
+    command.mut_args(with_class).mut_subcommands(with_classes)
+}
+
+fn with_class(arg: Arg) -> Arg {
+    let class = Decides::from_arg(&arg).filter(|class| *class != Decides::Nothing);
+    let Some(class) = class.map(Decides::word) else {
+        return arg;
     };
-    command.mut_args(mark).mut_subcommands(marked)
+    let help = arg.get_help().map(|help| format!("{help} [{class}]"));
+    let long = arg.get_long_help().map(ToString::to_string);
+    let long = long.map(|help| match help.split_once('\n') {
+        // The lines of its keys follow, each with its own class.
+        Some((first, keys)) if KeyedFlag::from_name(&name_of(&arg)).is_some() => {
+            format!("{first} [{class}]\n{keys}")
+        }
+        _ => format!("{help} [{class}]"),
+    });
+    let arg = arg.help(help.unwrap_or_default());
+    match long {
+        Some(long) => arg.long_help(long),
+        None => arg,
+    }
 }

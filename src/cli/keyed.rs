@@ -1,25 +1,26 @@
-//! Keyed flags in the definition of the command line: [`grouped`].
+//! Keyed flags in the definition of the command line: [`with_keyed_flags`].
 
 use clap::builder::PossibleValue;
-use clap::{Arg, ArgAction, Command};
+use clap::{Arg, ArgAction, Command, Id};
 
 use crate::types::Decides;
-use crate::types::flags::{KEYED_FLAGS, KeyedFlag, spelled};
+use crate::types::flags::{KEYED_FLAGS, KeyedFlag, flag_spelling};
 
 /// The name of a flag in files, which is the name of the field.
 pub(super) fn name_of(arg: &Arg) -> String {
     arg.get_id().as_str().replace('_', "-")
 }
 
-/// The command with its keyed flags, and the flags for their keys hidden.
-pub(super) fn grouped(mut command: Command) -> Command {
+/// The command and those in it, with their keyed flags. The flags for single keys are hidden.
+pub(super) fn with_keyed_flags(mut command: Command) -> Command {
     for keyed in &KEYED_FLAGS {
-        command = with_keyed(command, keyed);
+        command = with_keyed_flag(command, keyed);
     }
-    command.mut_subcommands(grouped)
+    command.mut_subcommands(with_keyed_flags)
 }
 
-fn with_keyed(command: Command, keyed: &KeyedFlag) -> Command {
+/// The command with one keyed flag, if it has flags for its keys.
+fn with_keyed_flag(command: Command, keyed: &KeyedFlag) -> Command {
     let keys = keyed.keys.iter().filter(|(key, _)| !key.is_empty());
     let members: Vec<(&str, Arg)> = keys
         .filter_map(|(key, flag)| {
@@ -32,29 +33,26 @@ fn with_keyed(command: Command, keyed: &KeyedFlag) -> Command {
         return command;
     };
     let lines: Vec<String> = members.iter().map(|(key, arg)| line(key, arg)).collect();
+    let lines = lines.join("\n");
     let names: Vec<&str> = members.iter().map(|(key, _)| *key).collect();
-    let is_member = |arg: &Arg| members.iter().any(|(_, own)| own.get_id() == arg.get_id());
+    let names = names.join(", ");
+    let member_ids: Vec<&Id> = members.iter().map(|(_, arg)| arg.get_id()).collect();
     if keyed.has_plain_value() {
-        let plain = |arg: Arg| {
-            let help = arg.get_help().map(ToString::to_string).unwrap_or_default();
-            let long = arg.get_long_help().map(ToString::to_string);
-            let long = long.unwrap_or_else(|| help.clone());
-            let keys = format!("; keys after a comma: {}", names.join(", "));
-            let (about, default) = help.split_at(help.find("; default: ").unwrap_or(help.len()));
-            arg.help(format!("{about}{keys}{default}"))
-                .long_help(format!("{long}; keys after a comma:\n{}", lines.join("\n")))
-        };
-        return command.mut_args(|arg| match name_of(&arg) {
-            name if name == keyed.name => plain(arg),
-            _ if is_member(&arg) => arg.hide(true),
-            _ => arg,
+        return command.mut_args(|arg| {
+            if name_of(&arg) == keyed.name {
+                with_keys_in_help(arg, &names, &lines)
+            } else if member_ids.contains(&arg.get_id()) {
+                arg.hide(true)
+            } else {
+                arg
+            }
         });
     }
     let (about, default) = keyed
         .about
         .split_once("; default: ")
         .unwrap_or((keyed.about, ""));
-    let help = format!("{about}: {}; default: {default}", names.join(", "));
+    let help = format!("{about}: {names}; default: {default}");
     let has_values = keyed.alone.is_none()
         && members
             .iter()
@@ -70,14 +68,27 @@ fn with_keyed(command: Command, keyed: &KeyedFlag) -> Command {
         .help_heading(keyed.heading)
         .display_order(first.get_display_order())
         .help(help)
-        .long_help(format!("{about}; keys:\n{}", lines.join("\n")));
+        .long_help(format!("{about}; keys:\n{lines}"));
     let arg = match Decides::from_arg(first) {
         Some(decides) => arg.add(decides),
         None => arg,
     };
     command
-        .mut_args(|arg| if is_member(&arg) { arg.hide(true) } else { arg })
+        .mut_args(|arg| {
+            let is_member = member_ids.contains(&arg.get_id());
+            if is_member { arg.hide(true) } else { arg }
+        })
         .arg(arg)
+}
+
+/// A flag whose value may have keys after it, with these keys in its help: their names, and one line for each.
+fn with_keys_in_help(arg: Arg, names: &str, lines: &str) -> Arg {
+    let help = arg.get_help().map(ToString::to_string).unwrap_or_default();
+    let long = arg.get_long_help().map(ToString::to_string);
+    let long = long.unwrap_or_else(|| help.clone());
+    let (about, default) = help.split_at(help.find("; default: ").unwrap_or(help.len()));
+    arg.help(format!("{about}; keys after a comma: {names}{default}"))
+        .long_help(format!("{long}; keys after a comma:\n{lines}"))
 }
 
 /// The help of a key: its values, what it decides, and its default.
@@ -105,7 +116,7 @@ pub(super) fn with_value(key: &str, arg: &Arg) -> String {
     }
     let possible = arg.get_possible_values();
     match &possible[..] {
-        // The only value is understood.
+        // A key with one possible value is written without it.
         [_] => key.to_owned(),
         [] => format!(
             "{key}={}",
@@ -119,55 +130,55 @@ pub(super) fn with_value(key: &str, arg: &Arg) -> String {
 }
 
 /// The text of an error of the parser, with hidden flags spelled as keys.
-pub(super) fn respelled(text: &str) -> String {
+pub(super) fn spell_as_keys(text: &str) -> String {
     let mut text = text.to_owned();
     for (key, flag) in KEYED_FLAGS.iter().flat_map(|keyed| keyed.keys) {
         if !key.is_empty() {
-            let spelled = spelled(flag);
+            let spelling = flag_spelling(flag);
             text = text
-                .replace(&format!("'--{flag} <"), &format!("'{spelled}=<"))
-                .replace(&format!("'--{flag}'"), &format!("'{spelled}'"));
+                .replace(&format!("'--{flag} <"), &format!("'{spelling}=<"))
+                .replace(&format!("'--{flag}'"), &format!("'{spelling}'"));
         }
     }
     text
 }
 
 /// The command without hidden flags and commands, for the completions of shells.
-pub(super) fn visible(command: &Command) -> Command {
+pub(super) fn without_hidden(command: &Command) -> Command {
     let args = command.get_arguments().filter(|arg| !arg.is_hide_set());
     let commands = command
         .get_subcommands()
         .filter(|inner| !inner.is_hide_set());
     let about = command.get_about().cloned().unwrap_or_default();
-    Command::new(lasting(command.get_name()))
+    Command::new(leaked(command.get_name()))
         .about(about)
-        .args(args.map(completed))
-        .subcommands(commands.map(visible))
+        .args(args.map(to_completion))
+        .subcommands(commands.map(without_hidden))
 }
 
 /// The completion of a flag or a positional argument.
-fn completed(arg: &Arg) -> Arg {
+fn to_completion(arg: &Arg) -> Arg {
     let help = arg.get_help().cloned().unwrap_or_default();
-    let completed = Arg::new(arg.get_id().clone())
+    let completion = Arg::new(arg.get_id().clone())
         .help(help)
         .action(arg.get_action().clone())
         .value_hint(arg.get_value_hint())
         .global(arg.is_global_set());
-    let completed = match arg.get_long() {
-        Some(long) => completed.long(lasting(long)),
-        None => completed,
+    let completion = match arg.get_long() {
+        Some(long) => completion.long(leaked(long)),
+        None => completion,
     };
-    let completed = completed.short(arg.get_short());
+    let completion = completion.short(arg.get_short());
     if !arg.get_action().takes_values() {
-        return completed;
+        return completion;
     }
     let names = arg.get_value_names().unwrap_or_default().iter().cloned();
-    completed
+    completion
         .value_names(names)
         .value_parser(arg.get_value_parser().clone())
 }
 
-/// A name for a command that is made once, before the process ends: the parser takes names that live as long.
-fn lasting(name: &str) -> &'static str {
+/// A name that lives as long as the process, which the parser requires. The command with this name is made once, so the leak is small.
+fn leaked(name: &str) -> &'static str {
     name.to_owned().leak()
 }

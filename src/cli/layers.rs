@@ -1,8 +1,8 @@
 //! The sources of a setting: flag, file of models, environment, file of flags.
 //!
-//! Values from the environment and files, for flags that were not typed, are turned into words and appended to the typed words. All of
-//! them are parsed together, once. So a value is read in the same way wherever it comes from. ripgrep does so with its configuration
-//! file (`crates/core/flags/parse.rs`).
+//! Values from the environment and files are turned into words, for flags that were not typed. They are appended to the typed words,
+//! and all words are parsed together, once. Thus a value is read in the same way wherever it comes from. ripgrep reads its
+//! configuration file like this (`crates/core/flags/parse.rs`).
 
 mod earlier_form;
 mod expansion;
@@ -27,11 +27,11 @@ use self::invalid_toml::invalid_toml;
 use self::layered_value::LayeredValue;
 use self::value_text::text_of;
 use super::command::SHORT_HELP;
-use super::keyed::{name_of, respelled};
+use super::keyed::{name_of, spell_as_keys};
 use crate::ask::OPENAI_KEY;
 use crate::error::{Error, Result};
 use crate::files::reading;
-use crate::types::text::near_name::{nearest, question, suggestion};
+use crate::types::text::near_name::{did_you_mean, nearest, suggestion};
 
 /// Prefix of this program's environment variables.
 const PREFIX: &str = "DARKQA_";
@@ -55,10 +55,10 @@ impl From<Error> for Problem {
     }
 }
 
-/// The matches of all words, and the flags that the call itself names.
+/// The matches of all words, and the flags that were typed.
 pub(super) struct Parsed {
     pub(super) matches: ArgMatches,
-    /// Flags by long name, without those of variables and files.
+    /// Long names of the flags that were typed, without those that variables and files set.
     pub(super) typed: BTreeSet<String>,
 }
 
@@ -102,17 +102,19 @@ pub(super) fn parse(
             .filter(|path| !path.is_empty())
             .map(PathBuf::from),
     };
-    let of_file = match &file {
+    let file_layer = match &file {
         Some(file) => expansion.layer(file_values(file, &all, command, &path)?)?,
         None => BTreeMap::new(),
     };
-    let models = models_values(own, command, [&environment, &of_file])?;
+    let models = models_values(own, command, [&environment, &file_layer])?;
     let (mut words, mut origins) = (Vec::new(), BTreeMap::new());
-    for layer in [&models, &environment, &of_file] {
+    for layer in [&models, &environment, &file_layer] {
         let mut newly_set = Vec::new();
         for arg in settable_flags(command) {
-            let hidden = || set.iter().any(|other| hides(command, other, arg));
-            if let Some(value) = layer.get(&name_of(arg)).filter(|_| !hidden()) {
+            let Some(value) = layer.get(&name_of(arg)) else {
+                continue;
+            };
+            if !set.iter().any(|other| hides(command, other, arg)) {
                 let flag = arg.get_long().unwrap_or_default();
                 words.extend(as_words(arg, flag, value)?);
                 origins.insert(flag.to_owned(), value.origin.clone());
@@ -122,13 +124,13 @@ pub(super) fn parse(
         set.extend(newly_set);
     }
     if let Some(file) = &file {
-        let in_effect = of_file.iter().filter_map(|(flag, value)| {
-            let is_in_effect = origins.get(flag) == Some(&value.origin);
-            is_in_effect.then(|| (flag.clone(), value))
-        });
-        let is_set = |flag: &str| set.iter().any(|arg| name_of(arg) == flag);
+        let in_effect = file_layer
+            .iter()
+            .filter(|(flag, value)| origins.get(*flag) == Some(&value.origin))
+            .map(|(flag, value)| (flag.clone(), value));
+        let flags_set: BTreeSet<String> = set.iter().map(|arg| name_of(arg)).collect();
         let has_key = variable(OPENAI_KEY).is_some_and(|text| !text.is_empty());
-        sent_secrets::check(file, &in_effect.collect(), is_set, has_key)?;
+        sent_secrets::check(file, &in_effect.collect(), &flags_set, has_key)?;
     }
     let mut typed = typed;
     let end = typed.iter().position(|word| word == "--");
@@ -171,7 +173,7 @@ fn typed_command<'a>(all: &'a Command, words: &[OsString]) -> (&'a Command, usiz
     (command, place)
 }
 
-/// Whether a word is a flag in its long or its short form, without a value.
+/// Returns true if a word is this flag in its long or its short form, without a value.
 fn has_form(arg: &Arg, word: &str) -> bool {
     match word.strip_prefix("--") {
         Some(long) => {
@@ -205,27 +207,30 @@ fn descend<'a>(all: &'a Command, path: &[String]) -> &'a Command {
 
 /// The flags of a command that the environment and a file can set.
 fn settable_flags(command: &Command) -> impl Iterator<Item = &Arg> {
-    let settable = |arg: &&Arg| {
-        let long = arg.get_long();
-        long.is_some() && !matches!(long, Some("help" | "version" | CONFIG))
-    };
-    command.get_arguments().filter(settable)
+    command.get_arguments().filter(|arg| {
+        arg.get_long()
+            .is_some_and(|long| !["help", "version", CONFIG].contains(&long))
+    })
 }
 
-/// Whether a flag that is set hides another in lower layers: the same flag, or one that conflicts with it.
+/// Returns true if a flag that is set hides another flag in lower layers. It hides itself, and each flag that conflicts with it.
 fn hides(command: &Command, set: &Arg, other: &Arg) -> bool {
-    let conflicts = |arg: &Arg, with: &Arg| {
-        command
-            .get_arg_conflicts_with(arg)
-            .into_iter()
-            .any(|arg| arg.get_id() == with.get_id())
-    };
-    set.get_id() == other.get_id() || conflicts(set, other) || conflicts(other, set)
+    set.get_id() == other.get_id()
+        || lists_conflict(command, set, other)
+        || lists_conflict(command, other, set)
+}
+
+/// Returns true if the definition of a flag lists `other` among its conflicts.
+fn lists_conflict(command: &Command, arg: &Arg, other: &Arg) -> bool {
+    command
+        .get_arg_conflicts_with(arg)
+        .into_iter()
+        .any(|conflicting| conflicting.get_id() == other.get_id())
 }
 
 /// The flags that the environment sets: `DARKQA_MAX_TOKENS` is `--max-tokens`; a list is separated by commas.
 ///
-/// A variable that only another command knows is skipped. One that no command knows is refused.
+/// A variable for a flag of another command is skipped. A variable for no flag at all is an error.
 fn environment_values(
     all: &Command,
     command: &Command,
@@ -259,7 +264,7 @@ fn environment_values(
     Ok(values.collect())
 }
 
-/// Repeatable flags of which one value may hold commas.
+/// Repeatable flags whose values may contain commas.
 const WITH_COMMAS: [&str; 2] = ["data", "map"];
 
 /// The variable of a flag.
@@ -275,7 +280,7 @@ fn every_flag(command: &Command) -> Vec<String> {
 }
 
 /// The flags that a TOML file sets: `max-tokens = 16`, `model = ["a", "b"]`, `blind = true`. A table with the name
-/// of a command is for this command alone, and overrides the flags at the top of the file.
+/// of a command applies only to this command, and overrides the flags at the top of the file.
 fn file_values(
     path: &Path,
     all: &Command,
@@ -286,18 +291,20 @@ fn file_values(
     let table: Table = text.parse().map_err(|e| invalid_toml(path, &text, &e))?;
     let mut values = BTreeMap::new();
     let flags: Vec<String> = settable_flags(command).map(name_of).collect();
-    read_table(&mut values, path, &table, all, (&flags, called), &[])?;
+    read_table(&mut values, path, &table, all, &flags, called, &[])?;
     Ok(values)
 }
 
-/// Adds the entries of a table, and of those nested tables that lead to the command that is called. The tables of other commands
-/// are checked: each of their keys is a flag of the command that it is for.
+/// Adds the entries of a table, and of those nested tables that lead to the command that is called. `flags` are the flags that the
+/// table may set, `called` is the rest of the path to the called command, and `within` has the names of the tables around this one.
+/// The tables of other commands are only checked: each of their keys must be a flag of its command.
 fn read_table(
     flag_values: &mut BTreeMap<String, LayeredValue>,
     path: &Path,
     table: &Table,
     at: &Command,
-    (flags, called): (&[String], &[String]),
+    flags: &[String],
+    called: &[String],
     within: &[&str],
 ) -> Result<()> {
     for (key, value) in table.iter().filter(|(_, value)| !value.is_table()) {
@@ -314,7 +321,7 @@ fn read_table(
                 continue;
             }
             let near = nearest(&flag, flags).map(|near| format!("--{near}"));
-            let hint = question(near.as_deref());
+            let hint = did_you_mean(near.as_deref());
             let problem = format_args!("there is no flag --{flag} here{hint}");
             return Err(Error::usage(origin, problem));
         }
@@ -344,18 +351,18 @@ fn read_table(
         let within = [within, &[name]].concat();
         match called.split_first() {
             Some((first, rest)) if first == name => {
-                read_table(flag_values, path, inner, next, (flags, rest), &within)?;
+                read_table(flag_values, path, inner, next, flags, rest, &within)?;
             }
             _ => {
                 let unused = &mut BTreeMap::new();
-                read_table(unused, path, inner, next, (&every_flag(next), &[]), &within)?;
+                read_table(unused, path, inner, next, &every_flag(next), &[], &within)?;
             }
         }
     }
     Ok(())
 }
 
-/// The flags that the file of models sets, which the call or a lower layer names.
+/// The flags that the file of models sets. The call or a lower layer names this file.
 fn models_values(
     own: &ArgMatches,
     command: &Command,
@@ -366,9 +373,9 @@ fn models_values(
         return Ok(BTreeMap::new());
     }
     let typed = own.get_one::<PathBuf>(MODELS).cloned();
-    let mut layered = layers.into_iter().filter_map(|layer| layer.get(MODELS));
-    let layered = || layered.next()?.values.first().map(PathBuf::from);
-    let Some(path) = typed.or_else(layered) else {
+    let layered = layers.into_iter().find_map(|layer| layer.get(MODELS));
+    let layered = layered.and_then(|value| value.values.first());
+    let Some(path) = typed.or_else(|| layered.map(PathBuf::from)) else {
         return Ok(BTreeMap::new());
     };
     let values = models_file::values(&path, &flags)?
@@ -393,18 +400,21 @@ fn as_words(arg: &Arg, flag: &str, value: &LayeredValue) -> Result<Vec<OsString>
             _ => Err(Error::usage(&value.origin, "true or false expected")),
         };
     }
-    let word = |value: &OsString| {
-        let mut word = OsString::from(format!("--{flag}="));
-        word.push(value);
-        word
+    let repeats = matches!(arg.get_action(), ArgAction::Append);
+    let values = if repeats || value.values.len() == 1 {
+        value.values.clone()
+    } else {
+        // The flag takes one text with commas, so a list is joined to such a text.
+        vec![value.values.join(OsStr::new(","))]
     };
-    // If a flag takes one text with commas, a list is joined to that text.
-    let list = matches!(arg.get_action(), ArgAction::Append);
-    if list || value.values.len() == 1 {
-        return Ok(value.values.iter().map(word).collect());
-    }
-    let joined = value.values.join(OsStr::new(","));
-    Ok(vec![word(&joined)])
+    Ok(values.iter().map(|value| as_word(flag, value)).collect())
+}
+
+/// A flag and its value as one word.
+fn as_word(flag: &str, value: &OsStr) -> OsString {
+    let mut word = OsString::from(format!("--{flag}="));
+    word.push(value);
+    word
 }
 
 /// The matches of all words. An error about a flag that was not typed names the source of its value.
@@ -425,8 +435,8 @@ fn parse_words(
     Ok(matches)
 }
 
-/// Refuses a flag of the evaluation in front of a command: `--levels L0 report RUN`. Global flags may stand there. clap's
-/// `args_conflicts_with_subcommands` would refuse them too.
+/// Refuses a flag of the evaluation in front of a command, as in `--levels L0 report RUN`. Global flags may stand there. This check
+/// replaces clap's `args_conflicts_with_subcommands`, which would refuse global flags too.
 fn check_flags_before_command(command: &Command, matches: &ArgMatches) -> Result<()> {
     let Some(name) = matches.subcommand_name() else {
         return Ok(());
@@ -478,13 +488,13 @@ pub(super) fn one_line(error: &clap::Error) -> String {
         .join(" ")
         .replace(" tip: ", "; tip: ");
     let line = line.trim_start_matches("error: ");
-    // An unknown flag is named as it was typed.
+    // An unknown flag keeps the spelling that was typed.
     match line.split_once("; tip: ") {
         Some((problem, tip)) if error.kind() == ErrorKind::UnknownArgument => {
-            format!("{problem}; tip: {}", respelled(tip))
+            format!("{problem}; tip: {}", spell_as_keys(tip))
         }
         None if error.kind() == ErrorKind::UnknownArgument => line.to_owned(),
-        _ => respelled(line),
+        _ => spell_as_keys(line),
     }
 }
 

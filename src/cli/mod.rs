@@ -30,7 +30,7 @@ use crate::run::{self, study};
 use crate::run_reports::report;
 use crate::runs::Outcome;
 use crate::types::manifests::Status;
-use crate::types::text::{shown, shown_in_colours};
+use crate::types::text::{escape_hidden, escape_hidden_except_styles};
 
 use command::{BatchCommand, Colours, Command, NAME, ReportCommand, ReportForm, StudyCommand};
 use layers::one_line;
@@ -62,7 +62,7 @@ pub fn main(words: impl Iterator<Item = OsString>) -> ExitCode {
     raise_limit();
     let words: Vec<OsString> = words.collect();
     let first_steps = if words.len() == 1 { FIRST_STEPS } else { "" };
-    let called: Vec<String> = words.iter().skip(1).map(text).collect();
+    let called: Vec<String> = words.iter().skip(1).map(word_text).collect();
     let parsed = match layers::parse(command::command(), words, |name| std::env::var_os(name)) {
         Ok(parsed) => parsed,
         Err(layers::Problem::Error(e)) => return fail(&e.to_string()),
@@ -75,7 +75,7 @@ pub fn main(words: impl Iterator<Item = OsString>) -> ExitCode {
             };
         }
     };
-    let cli = match read(&parsed, &called) {
+    let cli = match to_cli(&parsed, &called) {
         Ok(cli) => cli,
         Err(e) => return fail(&e.to_string()),
     };
@@ -108,12 +108,12 @@ pub fn main(words: impl Iterator<Item = OsString>) -> ExitCode {
 }
 
 /// A word of the call as text.
-fn text(word: &OsString) -> String {
+fn word_text(word: &OsString) -> String {
     word.to_string_lossy().into_owned()
 }
 
-/// The parsed command line, with the image flags that the manifest of a run stores.
-fn read(parsed: &layers::Parsed, words: &[String]) -> Result<Cli> {
+/// The command line as a structure, with the image flags that the manifest of a run stores.
+fn to_cli(parsed: &layers::Parsed, words: &[String]) -> Result<Cli> {
     let matches = &parsed.matches;
     let mut cli = Cli::from_arg_matches(matches)
         .map_err(|e| Error::usage("the command line", one_line(&e)))?;
@@ -187,13 +187,13 @@ fn no_run() -> Error {
     Error::CommandLine("report: the folder of a run is missing".to_owned())
 }
 
-/// All commands and flags of the program, so that a test can hold the documentation to them.
+/// All commands and flags of the program. A test compares the documentation with them.
 #[must_use]
 pub fn command() -> clap::Command {
     command::command()
 }
 
-/// Checks the words of a call as far as the parser does, so that a test can hold the documentation to it.
+/// Checks the words of a call as far as the parser does. A test checks the calls in the documentation with it.
 ///
 /// # Errors
 /// The text of the error.
@@ -206,11 +206,12 @@ pub fn check_words(words: impl IntoIterator<Item = OsString>) -> Result<(), Stri
     }
 }
 
+/// The completions of the command line for a shell.
 fn completions(shell: Shell) -> Outcome {
     let mut script = Vec::new();
     clap_complete::generate(
         shell,
-        &mut keyed::visible(&command::command()),
+        &mut keyed::without_hidden(&command::command()),
         NAME,
         &mut script,
     );
@@ -220,6 +221,7 @@ fn completions(shell: Shell) -> Outcome {
     )
 }
 
+/// Writes the manual pages into a folder.
 fn manual(folder: &Path) -> Result<Outcome> {
     std::fs::create_dir_all(folder).map_err(|e| Error::file(folder, "create", e))?;
     let command = command::command_for_manual().disable_help_subcommand(true);
@@ -231,22 +233,23 @@ fn manual(folder: &Path) -> Result<Outcome> {
     ))
 }
 
+/// Prints the outcome of a command, and returns the exit code for it.
 fn finish(outcome: &Outcome, verbosity: Verbosity, colours: ColorChoice) -> ExitCode {
     let mut stdout = AutoStream::new(std::io::stdout().lock(), colours);
-    let said = if verbosity == Verbosity::Normal || outcome.written.is_empty() {
-        stdout.write_all(shown_in_colours(&outcome.output).as_bytes())
+    let printed = if verbosity == Verbosity::Normal || outcome.written.is_empty() {
+        stdout.write_all(escape_hidden_except_styles(&outcome.output).as_bytes())
     } else {
-        // An incomplete run is reported on standard error, so that standard output has the paths alone. Nothing there has colours.
+        // An incomplete run is reported on standard error, without colours, so that standard output has only the paths.
         if outcome.status != Status::Complete {
             let mut stderr = AutoStream::never(std::io::stderr());
-            let _ = stderr.write_all(shown_in_colours(&outcome.output).as_bytes());
+            let _ = stderr.write_all(escape_hidden_except_styles(&outcome.output).as_bytes());
         }
         outcome
             .written
             .iter()
             .try_for_each(|path| writeln!(stdout, "{}", path.display()))
     };
-    match (outcome.status, said) {
+    match (outcome.status, printed) {
         (Status::Cancelled, _) => ExitCode::from(INTERRUPTED),
         (Status::OverBudget, _) => ExitCode::from(OVER_BUDGET),
         // A reader of the output, such as `head`, may close the pipe early.
@@ -256,9 +259,9 @@ fn finish(outcome: &Outcome, verbosity: Verbosity, colours: ColorChoice) -> Exit
     }
 }
 
-/// The one place where an error reaches the user, if standard error is still read by somebody.
+/// Prints an error on standard error, and returns the exit code for it. It ignores a standard error that is closed.
 fn fail(problem: &str) -> ExitCode {
-    let _ = writeln!(std::io::stderr(), "error: {}", shown(problem));
+    let _ = writeln!(std::io::stderr(), "error: {}", escape_hidden(problem));
     ExitCode::from(FATAL)
 }
 

@@ -18,7 +18,7 @@ use crate::run::evaluate::{EvaluateArgs, ShrinkArgs};
 use crate::run::openeqa::{JudgeArgs, OpenEqaArgs};
 use crate::run::synthesize::Sheet;
 use crate::types::degradations::Kind;
-use crate::types::flags::spelled;
+use crate::types::flags::flag_spelling;
 use crate::types::{AxisLevel, SetLight};
 use darkqa_enhance::{EnhancerArgs, ProbeArgs, RuntimeArgs, SizeArgs};
 use darkqa_light::{CameraArgs, LightArgs, SensorArgs};
@@ -29,8 +29,8 @@ pub(super) fn without_effect(cli: &Cli, matches: &ArgMatches) -> Vec<String> {
     let mut idle = NoEffect::new(layers::command_matches(matches));
     match &cli.command {
         None => idle.evaluation(&cli.evaluate),
-        Some(Command::Batch(BatchCommand::Export(args))) => idle.batch(&args.evaluate),
-        Some(Command::Batch(BatchCommand::Run(args))) => idle.batch(&args.evaluate),
+        Some(Command::Batch(BatchCommand::Export(args))) => idle.batch_evaluation(&args.evaluate),
+        Some(Command::Batch(BatchCommand::Run(args))) => idle.batch_evaluation(&args.evaluate),
         Some(Command::Plan(args)) => {
             let others = [
                 "timings",
@@ -46,7 +46,7 @@ pub(super) fn without_effect(cli: &Cli, matches: &ArgMatches) -> Vec<String> {
             idle.evaluation(args);
         }
         Some(Command::Check(args)) => idle.check(args),
-        Some(Command::OpenEqa(args)) => idle.open(args),
+        Some(Command::OpenEqa(args)) => idle.open_questions(args),
         Some(Command::Synthesize(command)) => {
             if let Some(args) = &command.images {
                 if args.sheet == Some(Sheet::Noise) {
@@ -104,30 +104,30 @@ fn ids<A: Args>() -> Vec<String> {
         .collect()
 }
 
-/// The flags that decide only degraded images. Without the seed, which decides guesses and orders, too.
+/// The flags that affect only degraded images. The seed is not one of them: it affects guesses and orders too.
 fn light() -> Vec<String> {
     without("seed", ids::<LightArgs>())
 }
 
-/// The flags that decide only noise.
+/// The flags that affect only noise.
 fn sensor() -> Vec<String> {
     without("seed", ids::<SensorArgs>())
 }
 
-/// The flags that decide only automatic exposure and motion blur.
+/// The flags that affect only automatic exposure and motion blur.
 fn camera() -> Vec<String> {
     ids::<CameraArgs>()
 }
 
-/// The flags of the sensor that automatic exposure takes: the others decide only the noise variant.
-const OF_AUTO: [&str; 2] = ["camera", "fixed"];
+/// The flags of the sensor that automatic exposure uses. The other ones affect only the noise variant.
+const SENSOR_FLAGS_OF_AUTO: [&str; 2] = ["camera", "fixed"];
 
 fn without(name: &str, mut ids: Vec<String>) -> Vec<String> {
     ids.retain(|id| id != name);
     ids
 }
 
-/// The flags that decide only enhanced images, without those of ONNX Runtime.
+/// The flags that affect only enhanced images, without those for ONNX Runtime.
 fn enhancement() -> Vec<String> {
     [ids::<EnhancerArgs>(), ids::<SizeArgs>(), ids::<ProbeArgs>()].concat()
 }
@@ -140,23 +140,22 @@ struct NoEffect {
 
 impl NoEffect {
     fn new(matches: &ArgMatches) -> Self {
-        let ids = matches.ids().map(ToString::to_string);
-        let typed = |id: &String| {
+        let typed = matches.ids().map(ToString::to_string).filter(|id| {
             let is_flag = matches.try_contains_id(id).unwrap_or(false);
             is_flag && matches.value_source(id) == Some(ValueSource::CommandLine)
-        };
+        });
         Self {
-            typed: ids.filter(typed).collect(),
+            typed: typed.collect(),
             lines: Vec::new(),
         }
     }
 
-    /// Adds a warning about those of these flags that were typed. Each flag is named once, with the first reason.
+    /// Adds a warning that names those of the given flags that were typed. Each flag is named once, with the first reason.
     fn because(&mut self, why: &str, flags: &[String]) {
         let idle: Vec<String> = flags
             .iter()
             .filter(|id| self.typed.remove(*id))
-            .map(|id| spelled(&id.replace('_', "-")))
+            .map(|id| flag_spelling(&id.replace('_', "-")))
             .collect();
         if !idle.is_empty() {
             self.lines
@@ -192,7 +191,7 @@ impl NoEffect {
         self.job(&args.job, &images, &replies, None);
     }
 
-    fn batch(&mut self, args: &EvaluateArgs) {
+    fn batch_evaluation(&mut self, args: &EvaluateArgs) {
         self.because("a batch has no request in flight", &["grace".to_owned()]);
         self.evaluation(args);
     }
@@ -207,7 +206,7 @@ impl NoEffect {
         }
     }
 
-    fn open(&mut self, args: &OpenEqaArgs) {
+    fn open_questions(&mut self, args: &OpenEqaArgs) {
         if args.study.is_some() {
             let asking = [
                 ids::<AccessArgs>(),
@@ -236,7 +235,7 @@ impl NoEffect {
         }
     }
 
-    /// Checks the flags of every experiment. `images` adds flags of images, `replies` adds flags of requests to servers.
+    /// Checks the flags that both experiments have. `images` adds flags for images, `replies` adds flags for requests to servers.
     fn job(
         &mut self,
         args: &JobArgs,
@@ -295,7 +294,7 @@ impl NoEffect {
         }
     }
 
-    /// Checks the flags of light against the levels and variants.
+    /// Checks the flags for degradation against the levels and variants.
     fn light(&mut self, args: &LightArgs) {
         let kinds: Vec<Kind> = args.variant.kinds().collect();
         let levels = args.levels(SetLight::Lit).0;
@@ -308,7 +307,7 @@ impl NoEffect {
             self.because("no variant has noise", &sensor());
         } else if !kinds.iter().any(|kind| kind.has_readings()) {
             let mut idle = sensor();
-            idle.retain(|id| !OF_AUTO.contains(&&**id));
+            idle.retain(|id| !SENSOR_FLAGS_OF_AUTO.contains(&&**id));
             let why = "automatic exposure has the reading physical, and a gain of its own (--auto)";
             self.because(why, &idle);
         }
@@ -320,7 +319,8 @@ impl NoEffect {
         }
     }
 
-    /// Checks the flags of enhancement. Enhancers that no condition uses are an error. The model `room-net` needs ONNX Runtime, too.
+    /// Checks the flags for enhancement. Enhancers that no condition uses are an error elsewhere. The model `room-net` needs ONNX Runtime
+    /// too.
     fn enhancement(&mut self, args: &EnhancerArgs, may_run_room_net: bool) {
         let mut runtime = ids::<RuntimeArgs>();
         runtime.retain(|id| !(may_run_room_net && ["ort_lib", "offline"].contains(&&**id)));
@@ -356,8 +356,8 @@ mod tests {
         without_effect(&Cli::from_arg_matches(&matches).unwrap(), &matches)
     }
 
-    /// Calls, each with the beginning of the one line that names its idle flags.
-    const IDLE: &[(&str, &str)] = &[
+    /// Command lines, each with the beginning of the one warning about it.
+    const WITH_WARNING: &[(&str, &str)] = &[
         (
             "--model m --blind --llie f.onnx --levels L3",
             "--levels, --llie: no effect: no model is shown an image",
@@ -498,7 +498,7 @@ mod tests {
 
     #[test]
     fn flags_without_effect_are_named() {
-        for (words, idle) in IDLE {
+        for (words, idle) in WITH_WARNING {
             let lines = lines(words);
             assert_eq!(lines.len(), 1, "{words}: {lines:?}");
             assert!(lines[0].starts_with(idle), "{words}: {lines:?}");

@@ -6,7 +6,7 @@ use std::path::Path;
 use clap::{Arg, Command as Clap, CommandFactory as _};
 
 use super::*;
-use crate::cli::keyed::{grouped, name_of, with_value};
+use crate::cli::keyed::{name_of, with_keyed_flags, with_value};
 use crate::types::Decides;
 use crate::types::flags::{KEYED_FLAGS, keyed_form};
 
@@ -15,7 +15,7 @@ fn the_command_line_is_valid() {
     command::command().help_expected(true).debug_assert();
 }
 
-/// The number of flags of an evaluation, without `--help` and `--version`, and without the hidden ones that keyed flags stand for.
+/// Does not count `--help` and `--version`, and the hidden flags that keyed flags stand for.
 #[test]
 fn an_evaluation_has_at_most_eighty_flags() {
     let mut command = command::command();
@@ -30,12 +30,14 @@ fn an_evaluation_has_at_most_eighty_flags() {
 }
 
 #[test]
-fn only_keys_are_hidden_and_every_key_is_of_a_flag() {
+fn only_keys_are_hidden_and_every_key_belongs_to_a_flag() {
     let mut root = command::command();
     root.build();
-    let is_wrong = |arg: &&Arg| arg.is_hide_set() != is_key(arg);
     for command in commands(&root) {
-        let wrong: Vec<&Arg> = command.get_arguments().filter(is_wrong).collect();
+        let wrong: Vec<&Arg> = command
+            .get_arguments()
+            .filter(|arg| arg.is_hide_set() != is_key(arg))
+            .collect();
         assert!(wrong.is_empty(), "{}: {wrong:?}", command.get_name());
     }
     for command in commands(&root) {
@@ -119,25 +121,21 @@ fn rare_flags_of_openeqa_exist() {
 fn short_help_names_flags_that_exist() {
     let root = command::command();
     let help = help("darkqa-eval -h");
-    let is_name = |c: char| c == '-' || c.is_ascii_alphanumeric();
     let flags: BTreeSet<&str> = help
-        .split(|c: char| !is_name(c))
+        .split(|c: char| c != '-' && !c.is_ascii_alphanumeric())
         .filter(|word| word.starts_with('-'))
         .collect();
     assert!(flags.len() > 20, "{flags:?}");
     for flag in flags {
-        let is_flag = |arg: &Arg| {
+        let exists = root.get_arguments().any(|arg| {
             let short = arg.get_short().map(|short| format!("-{short}"));
             let long = arg.get_long().map(|long| format!("--{long}"));
             [short, long].contains(&Some(flag.to_owned()))
-        };
-        let is_of_clap = matches!(flag, "-h" | "--help");
-        assert!(
-            is_of_clap || root.get_arguments().any(is_flag),
-            "{flag} is no flag"
-        );
+        });
+        let is_help = matches!(flag, "-h" | "--help");
+        assert!(is_help || exists, "there is no flag {flag}");
     }
-    // The two forms of a flag on one line are of one flag.
+    // A short and a long form on one line must belong to the same flag.
     for line in help.lines().filter_map(|line| line.strip_prefix("  -")) {
         let Some((short, rest)) = line.split_once(", --") else {
             continue;
@@ -195,19 +193,18 @@ fn commands_on_evaluations_do_not_repeat_its_flags() {
     );
 }
 
-#[test]
-fn short_forms_are_those_of_long_flags() {
-    let parsed = |line: &str| {
-        let words = line.split(' ').map(OsString::from).collect();
-        let parsed = layers::parse(command::command(), words, |_| None);
-        let Ok(parsed) = parsed else {
-            panic!("{line} is refused");
-        };
-        (
-            format!("{:?}", Cli::from_arg_matches(&parsed.matches)),
-            parsed.typed,
-        )
+/// The command line as a structure, in text form, and the flags that were typed.
+fn parsed(line: &str) -> (String, BTreeSet<String>) {
+    let words = line.split(' ').map(OsString::from).collect();
+    let Ok(parsed) = layers::parse(command::command(), words, |_| None) else {
+        panic!("{line} is refused");
     };
+    let cli = Cli::from_arg_matches(&parsed.matches);
+    (format!("{cli:?}"), parsed.typed)
+}
+
+#[test]
+fn a_short_form_sets_the_same_as_its_long_flag() {
     assert_eq!(
         parsed("d -m random -d set.tsv -e lift -n -q -o out"),
         parsed("d --model random --data set.tsv --llie lift --dry-run --quiet --out out")
@@ -220,7 +217,7 @@ fn short_forms_are_those_of_long_flags() {
 
 /// All flags of all commands as Markdown.
 fn reference() -> String {
-    let mut command = command::with_other_forms(grouped(Cli::command()));
+    let mut command = command::with_other_forms(with_keyed_flags(Cli::command()));
     command.build();
     let mut text = "# All flags\n\nEvery flag of every command, with its default and what it decides. A flag that means the same in several commands is \
                     described at the first of them. A variable is `DARKQA_` and the name of the flag in capitals; a key of a `--config` file is the name of \
@@ -244,8 +241,10 @@ fn section(
         .map(ToString::to_string)
         .unwrap_or_default();
     let _ = write!(text, "\n## {name}\n\n{about}\n");
-    let shown = |arg: &&Arg| !matches!(arg.get_id().as_str(), "help" | "version");
-    let mut args: Vec<&Arg> = command.get_arguments().filter(shown).collect();
+    let mut args: Vec<&Arg> = command
+        .get_arguments()
+        .filter(|arg| !is_added_by_clap(arg))
+        .collect();
     args.sort_by_key(|arg| order(command, arg));
     if !is_only_a_group(command) {
         let mut rows = String::new();
@@ -287,25 +286,24 @@ fn section(
     }
 }
 
-/// Whether a flag is hidden because a keyed flag sets the same.
+/// Returns true if a flag is hidden because a keyed flag sets the same.
 fn is_key(arg: &Arg) -> bool {
     keyed_form(&name_of(arg)).is_some()
 }
 
-/// Whether a command only holds other commands.
+/// Returns true if a command only contains other commands.
 fn is_only_a_group(command: &Clap) -> bool {
-    let has_own = |arg: &Arg| !arg.is_global_set() && !is_of_clap(arg);
-    command.has_subcommands() && !command.get_arguments().any(has_own)
+    let has_own_flags = command
+        .get_arguments()
+        .any(|arg| !arg.is_global_set() && !is_added_by_clap(arg));
+    command.has_subcommands() && !has_own_flags
 }
 
 /// The place of a flag in the list: keys stand below their keyed flag.
 fn order(command: &Clap, arg: &Arg) -> (usize, bool) {
     let keyed = KEYED_FLAGS.iter().find(|keyed| {
-        keyed
-            .keys
-            .iter()
-            .map(|(_, flag)| *flag)
-            .any(|flag| flag == name_of(arg))
+        let name = name_of(arg);
+        keyed.keys.iter().any(|(_, flag)| *flag == name)
     });
     let keyed = keyed.and_then(|keyed| {
         let mut args = command.get_arguments();
@@ -385,14 +383,18 @@ fn row(arg: &Arg) -> String {
     } else {
         format!(": {}", words.join(", "))
     };
-    let escaped = |text: &str| text.replace('|', "\\|").replace('\n', " ");
     format!(
         "| `{}`{key} | {} | {} | {}{words} |\n",
-        escaped(&flag),
-        escaped(&default),
+        in_cell(&flag),
+        in_cell(&default),
         Decides::from_arg(arg).map_or("", Decides::word),
-        escaped(&what)
+        in_cell(&what)
     )
+}
+
+/// A text as a cell of a Markdown table.
+fn in_cell(text: &str) -> String {
+    text.replace('|', "\\|").replace('\n', " ")
 }
 
 #[test]
@@ -419,17 +421,18 @@ fn commands(command: &Clap) -> Vec<&Clap> {
         .collect()
 }
 
-fn is_of_clap(arg: &Arg) -> bool {
+/// Returns true for the flags that clap adds to commands.
+fn is_added_by_clap(arg: &Arg) -> bool {
     matches!(arg.get_id().as_str(), "help" | "version")
 }
 
 #[test]
-fn every_flag_says_what_it_is_what_it_decides_and_its_default() {
+fn every_flag_has_help_a_class_and_a_stated_default() {
     let mut root = Cli::command();
     root.build();
     let mut wrong = Vec::new();
     for command in commands(&root) {
-        for arg in command.get_arguments().filter(|arg| !is_of_clap(arg)) {
+        for arg in command.get_arguments().filter(|arg| !is_added_by_clap(arg)) {
             let name = format!("{} {}", command.get_name(), arg.get_id());
             let help = arg.get_help().map(ToString::to_string).unwrap_or_default();
             if help.is_empty() {
@@ -465,7 +468,7 @@ fn words_of(text: &str) -> String {
 }
 
 #[test]
-fn the_manual_says_what_the_help_says() {
+fn the_manual_has_the_text_of_the_help() {
     let mut root = command::command_for_manual();
     root.build();
     let mut wrong = Vec::new();
@@ -476,11 +479,13 @@ fn the_manual_says_what_the_help_says() {
             .unwrap();
         let page = words_of(&String::from_utf8(page).unwrap());
         let shown = words_of(&command.clone().term_width(0).render_long_help().to_string());
-        let is_shown = |arg: &&Arg| !is_of_clap(arg) && !arg.is_hide_set();
-        for arg in command.get_arguments().filter(is_shown) {
+        for arg in command.get_arguments() {
+            if is_added_by_clap(arg) || arg.is_hide_set() {
+                continue;
+            }
             let help = arg.get_long_help().or(arg.get_help());
             let help = words_of(&help.map(ToString::to_string).unwrap_or_default());
-            // Pages of commands on evaluations refer to that of the program, as `-h` does.
+            // Pages of commands that take the flags of an evaluation refer to the first page, as `-h` does.
             let is_in_page = !arg.is_hide_short_help_set();
             for (text, place, expected) in [(&page, "manual", is_in_page), (&shown, "help", true)] {
                 if expected && !text.contains(&help) {

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::text::words::light;
 use crate::types::degradations::Axis;
-use crate::types::text::shown;
+use crate::types::text::escape_hidden;
 use crate::types::{AxisLevel, Condition, EnhancerName, FrameId, RunGroup, Thumbnail, Variant};
 
 /// Table of sample images at the levels of one axis.
@@ -46,7 +46,7 @@ pub(crate) fn samples(thumbnails: &[Thumbnail]) -> Vec<SampleTable> {
     .filter_map(|axis| {
         let on_axis: Vec<&Thumbnail> = thumbnails
             .iter()
-            .filter(|thumbnail| thumbnail.condition.level().is_shown_on(axis))
+            .filter(|thumbnail| thumbnail.condition.level().belongs_to(axis))
             .collect();
         axis_table(&on_axis, axis)
     })
@@ -111,9 +111,8 @@ fn belongs_to_row(
     enhancer: Option<&EnhancerName>,
 ) -> bool {
     let is_clean_frame = condition.level() == AxisLevel::L0
-        && RunGroup::meet(condition.group.as_ref(), variant.group.as_ref());
-    condition.enhancer.as_ref() == enhancer
-        && (condition.kind_reading() == *variant || is_clean_frame)
+        && RunGroup::overlap(condition.group.as_ref(), variant.group.as_ref());
+    condition.enhancer.as_ref() == enhancer && (condition.variant() == *variant || is_clean_frame)
 }
 
 /// Variant and enhancer of each row of a frame. Clean frames are in the rows of the degraded ones; they get a row of their own if no
@@ -122,7 +121,7 @@ fn row_lights<'a>(thumbnails: &[&'a Thumbnail]) -> BTreeSet<(Variant, Option<&'a
     let (mut lights, clean): (BTreeSet<_>, BTreeSet<_>) = thumbnails
         .iter()
         .map(|thumbnail| &thumbnail.condition)
-        .map(|condition| (condition.kind_reading(), condition.enhancer.as_ref()))
+        .map(|condition| (condition.variant(), condition.enhancer.as_ref()))
         .partition(|(variant, _)| variant.is_degraded());
     for (_, enhancer) in clean {
         if lights.iter().all(|(_, other)| *other != enhancer) {
@@ -178,7 +177,7 @@ pub(crate) fn figure(samples: &SampleTable) -> String {
 
 /// Escapes hidden characters, and the special characters of XML.
 fn escape_xml(text: &str) -> String {
-    shown(text)
+    escape_hidden(text)
         .replace('&', "&amp;")
         .replace('<', "&lt;")
         .replace('>', "&gt;")

@@ -67,7 +67,7 @@ impl DarkImages {
     pub(crate) fn new(set: SetLight, light: &LightSettings, enhancers: &EnhancerArgs) -> Self {
         let is_undarkened_only = light.levels == [AxisLevel::L0]
             && !enhancers.is_empty()
-            && enhancers.on().includes(None);
+            && enhancers.on().includes_kind(None);
         if set == SetLight::Dark || is_undarkened_only {
             Self::Expected
         } else {

@@ -518,8 +518,8 @@ impl<I: Item> ReplySink<'_, I> {
             Ok(reply) => answered(blank, reply)?,
             Err(error) => Record {
                 lost: *error.lost,
-                finish: error.finish.map(|word| Finish::Other(word).shortened()),
-                ..blank.failed_by(error.failure, error.attempts)
+                finish: error.finish.map(|word| Finish::Other(word).shorten()),
+                ..blank.with_failure(error.failure, error.attempts)
             },
         };
         self.store.append(&record)?;

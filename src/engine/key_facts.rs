@@ -9,7 +9,7 @@ use crate::images::trials::Prompt;
 use crate::types::{Condition, Digest, QuestionId, TrialKey};
 
 /// The inputs that affect a reply, from which the key of a trial is computed. Question and condition are included, because built-in
-/// models answer by their names. The fields are sorted by name, as [`Digest::sorted`] requires.
+/// models answer by their names. The fields are sorted by name, as [`Digest::presorted`] requires.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(crate) struct KeyFacts<'a> {
     before: &'a str,
@@ -70,6 +70,6 @@ impl<'a> KeyFacts<'a> {
 
     /// Computes the key of the trial, a digest of all facts.
     pub(crate) fn key(&self) -> Result<TrialKey> {
-        Digest::sorted("darkqa.trial/2", self).map(Into::into)
+        Digest::presorted("darkqa.trial/2", self).map(Into::into)
     }
 }

@@ -365,7 +365,7 @@ impl<E: Experiment> OpenRun<'_, E> {
         for (name, usage) in usages {
             let name = name.to_string();
             let earlier = self.manifest.enhancers.remove(&name);
-            let note = usage.note().after(earlier);
+            let note = usage.note().with_earlier(earlier);
             self.manifest.enhancers.insert(name, note);
         }
     }

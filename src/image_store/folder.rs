@@ -68,7 +68,7 @@ impl StoreFolder {
     /// Makes the folder.
     pub(super) fn make(&self) -> io::Result<()> {
         refuse_link(&self.root)?;
-        self.access.make(&self.root)
+        self.access.create_io(&self.root)
     }
 
     /// The file of a key.
@@ -84,7 +84,7 @@ impl StoreFolder {
         let folder = place.parent().unwrap_or(&self.root);
         self.make()?;
         refuse_link(folder)?;
-        self.access.make(folder)?;
+        self.access.create_io(folder)?;
         let number = self.count.fetch_add(1, Ordering::Relaxed);
         let unfinished = folder.join(format!("{}{number}", self.unfinished));
         let written = File::create_new(&unfinished)

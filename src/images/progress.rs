@@ -9,7 +9,7 @@ use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressState, P
 use tracing_subscriber::fmt::MakeWriter;
 
 use crate::report::forecast::{hours, money};
-use crate::types::text::shown;
+use crate::types::text::escape_hidden;
 
 /// Progress on standard error: bars on a terminal, otherwise one line a minute about the trials.
 #[derive(Debug, Clone)]
@@ -212,7 +212,7 @@ impl Write for LogWriter {
     /// Writes a line with hidden characters escaped, because it may quote a file. Errors of a closed terminal or pipe are ignored.
     fn write(&mut self, line: &[u8]) -> io::Result<usize> {
         let text = String::from_utf8_lossy(line);
-        let shown = shown(&text);
+        let shown = escape_hidden(&text);
         let _ = self.0.suspend(|| io::stderr().write_all(shown.as_bytes()));
         Ok(line.len())
     }

@@ -5,7 +5,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::labels::names::{UNKNOWN, overridden};
+use crate::labels::names::{UNKNOWN, class_override};
 use crate::types::SegmentName;
 
 /// Used content of a `.house` file.
@@ -53,7 +53,7 @@ pub(super) fn parse(text: &str, classes: &BTreeSet<String>) -> Result<House, (us
                     return Err(short());
                 };
                 let name = name.replace('#', " ");
-                let class = overridden(&name).unwrap_or(class);
+                let class = class_override(&name).unwrap_or(class);
                 let class = if classes.contains(class) {
                     class
                 } else {

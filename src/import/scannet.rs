@@ -17,7 +17,7 @@ use super::files::{
 };
 use crate::error::{Error, Result};
 use crate::files::reading::{bytes, json, text};
-use crate::labels::names::{UNKNOWN, overridden};
+use crate::labels::names::{UNKNOWN, class_override};
 use crate::labels::{canonical, space};
 use crate::picture::raw_png::SampleForm;
 use crate::types::{Intrinsics, Label, Labels, Rgb};
@@ -200,7 +200,7 @@ fn read_label_table(path: &Path) -> Result<Labels> {
         let Ok(id) = cell(&row, id).parse::<u16>() else {
             continue;
         };
-        let class = overridden(cell(&row, raw)).unwrap_or(cell(&row, class));
+        let class = class_override(cell(&row, raw)).unwrap_or(cell(&row, class));
         if matches!(class, "void" | "unlabeled") {
             labels.void.insert(id);
             continue;

@@ -19,7 +19,7 @@ use crate::text::frame_count::frames;
 use crate::text::ladder::{Ladder, SeriesByLevel};
 use crate::text::noise_profiles::NoiseProfiles;
 use crate::text::terminal::render;
-use crate::text::words::{counted, percent, reach_of};
+use crate::text::words::{counted, percent, widest_reach_of};
 use crate::text::wrapped::{WIDTH, wrapped};
 use crate::types::manifests::RunManifest;
 use crate::types::{Axis, AxisLevel};
@@ -183,7 +183,7 @@ fn accuracy_table(report: &ChoiceReport<'_>) -> String {
     let summary = common.map_or(&report.findings.summary, |common| &common.summary);
     let cells = summary.family_cells(None, ReadingMode::Strict);
     let ladder = Ladder::new(cells.map(|cell| (&cell.subject, cell)))
-        .in_light_of(report.findings)
+        .with_pairs(report.findings)
         .with_clean();
     let mut models: Vec<&str> = ladder.series.keys().map(|series| series.model).collect();
     models.dedup();
@@ -212,12 +212,7 @@ fn accuracy_table(report: &ChoiceReport<'_>) -> String {
     let longest_name = rows.iter().map(|row| row.name.chars().count()).max();
     let longest_title = rows.iter().map(|row| row.block.chars().count()).max();
     let most_levels = Axis::ALL
-        .map(|axis| {
-            levels
-                .iter()
-                .filter(|level| level.is_shown_on(axis))
-                .count()
-        })
+        .map(|axis| levels.iter().filter(|level| level.belongs_to(axis)).count())
         .into_iter()
         .max()
         .unwrap_or_default();
@@ -257,7 +252,7 @@ fn accuracy_table(report: &ChoiceReport<'_>) -> String {
             let levels: Vec<AxisLevel> = levels
                 .iter()
                 .copied()
-                .filter(|level| level.is_shown_on(axis))
+                .filter(|level| level.belongs_to(axis))
                 .collect();
             for levels in levels.chunks(MAX_LEVELS) {
                 text += &block_lines(report, &block, levels, &names);
@@ -296,7 +291,7 @@ fn block_lines(
             last_group = row.group;
             let _ = writeln!(text, " — {}", last_group.unwrap_or_default());
         }
-        let reach = reach_of(cells.iter().flatten().filter_map(|cell| cell.accuracy));
+        let reach = widest_reach_of(cells.iter().flatten().filter_map(|cell| cell.accuracy));
         text += &names.line(
             &row.name,
             cells.iter().map(|cell| accuracy_text(report, *cell)),

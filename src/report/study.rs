@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::error::Result;
-use crate::text::script::embedded;
+use crate::text::script::to_script_json;
 use crate::types::Digest;
 
 /// Template of the page.
@@ -59,7 +59,7 @@ pub(crate) fn page(items: &[StudyQuestion]) -> Result<String> {
             .map(String::as_bytes);
         std::iter::once(item.id.as_bytes()).chain(images)
     }));
-    Ok(PAGE.replacen(PLACEHOLDER, &embedded(&StudyPage { set, items })?, 1))
+    Ok(PAGE.replacen(PLACEHOLDER, &to_script_json(&StudyPage { set, items })?, 1))
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use minijinja::{AutoEscape, Environment};
 use serde::Serialize;
 
 use crate::error::{Error, Result};
-use crate::types::text::shown;
+use crate::types::text::escape_hidden;
 
 /// Parts that several pages share: placeholder in a template, and its text.
 const PARTS: [(&str, &str); 3] = [
@@ -30,5 +30,5 @@ pub(super) fn render(template: &str, values: impl Serialize) -> Result<String> {
     let page = environment
         .render_named_str("page", &whole, Serde(values))
         .map_err(|e| Error::data("report.html", e))?;
-    Ok(shown(&page).into_owned())
+    Ok(escape_hidden(&page).into_owned())
 }

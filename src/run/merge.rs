@@ -73,8 +73,8 @@ fn merge_all<D: Detail>(
     append_records(&mut store, &shards.manifest, &shards.manifests(), records)?;
     store.sync()?;
     let wanted = MissingThumbnails::new(shards.questions.frames(), Vec::new());
-    store.add_thumbnails_of(&folders, |frame| wanted.wants(frame))?;
-    store.add_fidelity_of(&folders, |_| true)?;
+    store.add_thumbnails_from(&folders, |frame| wanted.wants(frame))?;
+    store.add_fidelity_from(&folders, |_| true)?;
     drop(folders);
     // The trials are read again from the merged run.
     let manifest = shards.into_manifest();

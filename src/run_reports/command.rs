@@ -204,7 +204,7 @@ fn report_choices(
     if args.common {
         combined = keep_common_items(combined)?;
     }
-    combined.listing.show(&args.columns);
+    combined.listing.add_columns(&args.columns);
     let baseline = new_and_old
         .map(|(new, old)| Baseline::new(&combined, new, old))
         .transpose()?;
@@ -348,7 +348,7 @@ fn report_open(
     let is_single = runs.len() == 1 && duplicate_alerts.is_empty();
     let mut joined = open::combine(runs)?;
     joined.alerts.splice(..0, duplicate_alerts.iter().cloned());
-    joined.listing.show(&args.columns);
+    joined.listing.add_columns(&args.columns);
     let scores = open::Scores::new(joined)?;
     let run = &scores.run;
     if is_single && args.out.is_none() {

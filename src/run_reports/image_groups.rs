@@ -20,7 +20,7 @@ pub(super) struct LightCurve {
 impl LightCurve {
     fn new(condition: &Condition) -> Self {
         Self {
-            variant: condition.kind_reading(),
+            variant: condition.variant(),
             enhancer: condition.enhancer.clone(),
         }
     }
@@ -286,7 +286,7 @@ impl ImageComparison {
 fn image<D: Detail>(trial: TrialRef<'_, D>) -> Option<(&Condition, &str, Option<Digest>)> {
     let is_image = !trial.failed() && !is_control(trial.model());
     let condition = trial.condition().filter(|_| is_image)?;
-    Some((condition, trial.source(), trial.sent()))
+    Some((condition, trial.source(), trial.sent_digest()))
 }
 
 /// True if two runs have the same images on a curve according to their manifests.

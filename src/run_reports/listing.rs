@@ -35,7 +35,7 @@ pub(super) fn listing<D: Detail>(joined: &Joined<D>) -> ModelListing {
         for (field, changes) in &run.manifest.settings {
             if let Some(model) = field.strip_prefix(ADAPTED_FOR) {
                 let changes = strings(Some(changes)).map(str::to_owned);
-                listing.adapted(&shown(model), changes);
+                listing.add_changes(&shown(model), changes);
             }
         }
         for (model, content) in run.manifest.columns.get("model").into_iter().flatten() {
@@ -59,7 +59,7 @@ pub(super) fn listing<D: Detail>(joined: &Joined<D>) -> ModelListing {
     }
     for ((column, model), values) in facts {
         let values: Vec<String> = values.into_iter().collect();
-        listing.note(column, model, values.join(", "));
+        listing.set_cell(column, model, values.join(", "));
     }
     listing
 }

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::settings::{Setting, Settings, differing_settings, is_digest, model_settings};
 use crate::runs::stored::StoredRun;
-use crate::types::flags::spelled_setting;
+use crate::types::flags::setting_spelling;
 use crate::types::{Condition, QuestionId, RunQuestion, TrialKey, TrialRef, View};
 use darkqa_score::answers::record::Detail;
 
@@ -221,7 +221,7 @@ fn suffixes(groups: &[Vec<usize>], differences: &[Setting], names: &[String]) ->
                 .iter()
                 .map(|setting| {
                     let (_, value) = setting.values.iter().find(|(run, _)| group.contains(run))?;
-                    Some(format!("{} {value}", spelled_setting(&setting.flag)))
+                    Some(format!("{} {value}", setting_spelling(&setting.flag)))
                 })
                 .collect::<Option<_>>()?;
             Some(settings.join(", "))
@@ -302,8 +302,9 @@ fn overlaps<'a, D: Detail>(
             _ => false,
         };
         let [(run, trial), (other_run, other)] = [one, other];
-        let image = trial.sent();
-        let same_image = trial.view() == View::Image && image.is_some() && image == other.sent();
+        let image = trial.sent_digest();
+        let same_image =
+            trial.view() == View::Image && image.is_some() && image == other.sent_digest();
         same_words
             && same_image
             && [run, other_run]

@@ -362,7 +362,7 @@ fn failures(records: &[Record<OpenDetail>]) -> BTreeMap<(&QuestionId, ModelInCon
         .filter(|record| record.detail.step == Step::Answer)
         .filter_map(|record| {
             let failure = record.failure.as_ref()?;
-            let kind = outcome_words::failed(failure.kind, failure.status);
+            let kind = outcome_words::failure_reason(failure.kind, failure.status);
             let subject = ModelInCondition::new(&record.model, record.condition.as_ref());
             let text = format!("{kind}: {}", failure.message);
             Some(((&record.question, subject), text))

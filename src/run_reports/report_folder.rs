@@ -74,7 +74,7 @@ pub(super) fn write_in_place<D: Detail>(
     write: impl FnOnce(&ReportFolder<'_, D>) -> Result<String>,
 ) -> Result<Option<String>> {
     let written = match layout {
-        RunLayout::Whole => match Store::open_read(folder, manifest, AddressChange::Allowed) {
+        RunLayout::Whole => match Store::open_checked(folder, manifest, AddressChange::Allowed) {
             Ok(store) => return write(&ReportFolder::Run(&store)).map(Some),
             // A run that another process is writing, or in a read-only folder, is still reported on standard output.
             Err(error) => Err(error),

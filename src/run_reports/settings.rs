@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde_json::Value;
 
 use crate::types::degradations::Kind;
-use crate::types::flags::spelled_setting;
+use crate::types::flags::setting_spelling;
 use crate::types::manifests::{JUDGES, RunManifest};
 
 /// Values of settings as text, by flag.
@@ -70,7 +70,7 @@ impl Setting {
             .collect();
         format!(
             "{} is {}",
-            spelled_setting(&self.flag),
+            setting_spelling(&self.flag),
             joined_with_and(&values)
         )
     }

@@ -24,7 +24,7 @@ impl<M> MarkIndex<M> {
         Self {
             question_digests: questions
                 .into_iter()
-                .map(|question| (question.id.clone(), question.judged_words()))
+                .map(|question| (question.id.clone(), question.judge_digest()))
                 .collect(),
             by_answer: HashMap::new(),
         }

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use crate::error::{Error, Result};
 use crate::runs::shard_records::{append_records, latest_trials};
 use crate::store::{self, Store};
-use crate::types::flags::spelled_setting;
+use crate::types::flags::setting_spelling;
 use crate::types::manifests::{RunManifest, differences};
 use crate::types::{FrameId, TextPlace, TrialKey};
 use darkqa_score::answers::record::Detail;
@@ -41,7 +41,7 @@ impl OtherShards {
             if let Some((field, before, now)) =
                 differences(&other.identity, &manifest.identity).next()
             {
-                let field = spelled_setting(field);
+                let field = setting_spelling(field);
                 return Err(Error::Run {
                     path: path.clone(),
                     problem: format!(
@@ -104,8 +104,8 @@ impl OtherShards {
             .collect();
         append_records(store, manifest, &shards, found.iter().copied())?;
         let folders: Vec<&Path> = shards.iter().map(|(folder, _)| *folder).collect();
-        store.add_thumbnails_of(&folders, |frame| sources.contains(frame))?;
-        store.add_fidelity_of(&folders, |frame| sources.contains(frame))?;
+        store.add_thumbnails_from(&folders, |frame| sources.contains(frame))?;
+        store.add_fidelity_from(&folders, |frame| sources.contains(frame))?;
         store.sync()?;
         Ok(found.len())
     }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use crate::ask::prompts::openeqa::blind_answer;
 use crate::types::{OpenDetail, QuestionId, Record, Step, Via, View};
-use darkqa_score::choice::llm_match::{Protocol, shortened};
+use darkqa_score::choice::llm_match::{Protocol, truncate_answer};
 use darkqa_score::subject::ModelInCondition;
 
 /// The state of one answer.
@@ -91,7 +91,7 @@ fn state(record: Option<&Record<OpenDetail>>, protocol: Protocol) -> (Option<Str
         return (None, AnswerState::Null);
     };
     let answer = match protocol {
-        Protocol::Upstream => shortened(&full),
+        Protocol::Upstream => truncate_answer(&full),
         Protocol::Tolerant => &full,
     };
     let state = AnswerState::Text {

@@ -67,7 +67,7 @@ pub(crate) fn note_renamed_models(
             Digest::canonical("darkqa.model-name/1", &reply_settings(content))?.to_string();
         names.ensure(name, || format!("{name} [{}]", &digest[..8]));
     }
-    names.note(manifest);
+    names.write_to(manifest);
     let new_name = |name: &String| new_names.get(name).unwrap_or(name).clone();
     for model in &mut manifest.models {
         // Names in the models file are already current.
@@ -94,9 +94,9 @@ pub(crate) fn note_renamed_models(
             manifest.settings.insert(adapted_key(new), changes.clone());
         }
     }
-    if settings == SettingsChange::Allowed || stored_views.is_noted() {
+    if settings == SettingsChange::Allowed || stored_views.is_complete() {
         let stored_names = before.keys().map(|name| (name, new_name(name)));
-        stored_views.note(manifest, stored_names, command.views);
+        stored_views.write_to(manifest, stored_names, command.views);
     }
     let left_out = left_out(manifest, stored, now, &new_names, settings);
     if left_out.is_empty() {
@@ -127,8 +127,8 @@ fn new_names(
     // How well a stored model matches a current one; `None` if they are different models.
     let fit = |old: &String, new: &String| {
         let is_same = reply_settings(before.get(old)?) == reply_settings(now.get(new)?);
-        let fit = views.fit(old, command.views.get(new)?);
-        (is_same && fit > Fit::Apart).then_some(fit)
+        let fit = views.compare(old, command.views.get(new)?);
+        (is_same && fit > Fit::Disjoint).then_some(fit)
     };
     let keeps_name = |name: &String| match (before.get(name), now.get(name)) {
         // A model that gets other inputs now keeps its name, unless the name fits another stored model.
@@ -141,7 +141,7 @@ fn new_names(
     let mut new_names: BTreeMap<String, String> = BTreeMap::new();
     let mut taken = BTreeSet::new();
     // Take the best fits first.
-    for min_fit in [Fit::Whole, Fit::Part, Fit::Unknown] {
+    for min_fit in [Fit::Equal, Fit::Overlapping, Fit::Unknown] {
         for new in now.keys().filter(|new| !keeps_name(new)) {
             if taken.contains(new) {
                 continue;
@@ -235,7 +235,7 @@ pub(crate) fn left_out_models(manifest: &RunManifest) -> Vec<String> {
 
 /// Changes the model name in a record to the current one.
 pub(crate) fn rename_record<D>(record: &mut Record<D>, names: &RecordedNames) {
-    let current = names.shown(&record.model);
+    let current = names.table_name(&record.model);
     if current != record.model {
         record.model = current.to_owned();
     }
@@ -245,7 +245,7 @@ pub(crate) fn rename_record<D>(record: &mut Record<D>, names: &RecordedNames) {
 pub(crate) fn rename_trials<D: Detail>(trials: &mut Trials<D>, manifest: &RunManifest) {
     let names = RecordedNames::from_manifest(manifest);
     trials.rename(|model| {
-        let current = names.shown(model);
+        let current = names.table_name(model);
         (current != model).then(|| current.to_owned())
     });
 }

@@ -46,7 +46,7 @@ impl<D: Detail> RunTexts<D> {
     /// # Errors
     /// If the file of records cannot be opened.
     pub(crate) fn open(folder: &Path) -> Result<Self> {
-        Ok(match RecordLog::open_if_there(folder)? {
+        Ok(match RecordLog::open_if_exists(folder)? {
             None => Self::InMemory(InMemoryTexts::new(Vec::new(), Vec::new()).into()),
             Some(log) => {
                 let folder = folder.to_owned();

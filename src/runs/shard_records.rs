@@ -40,7 +40,7 @@ pub(crate) fn read_shard<D: Detail>(
 pub(crate) fn latest_trials<D: Detail>(folder: &Path, manifest: &RunManifest) -> Result<Trials<D>> {
     let mut trials = Trials::default();
     read_shard(&mut trials, folder, manifest, 0)?;
-    trials.each_key_once(|first, later| Ok(first.or_later(later)))?;
+    trials.keep_one_per_key(|first, later| Ok(first.or_later(later)))?;
     Ok(trials)
 }
 

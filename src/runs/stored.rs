@@ -110,7 +110,7 @@ impl<D: Detail> StoredRun<D> {
         files: RunFiles,
     ) -> Result<Self> {
         renamed::rename_trials(&mut trials, &manifest);
-        trials.each_key_once(|first, later| Ok(first.or_later(later)))?;
+        trials.keep_one_per_key(|first, later| Ok(first.or_later(later)))?;
         let ids = files.questions.iter().map(|question| &question.id);
         sort_trials(&mut trials, ids, &manifest.models);
         Ok(Self {
@@ -300,7 +300,7 @@ fn list_runs(folder: &Path) -> Vec<String> {
         .flatten()
         .flatten()
         .map(|entry| entry.path())
-        .filter(|path| store::holds_run(path))
+        .filter(|path| store::is_run(path))
         .map(|path| path.display().to_string())
         .collect();
     runs.sort();

@@ -1,4 +1,4 @@
-//! Sentences about the replies: how many could not be read, and whether fidelity predicts right ones.
+//! Sentences about replies: the number that could not be read, and whether image fidelity predicts right answers.
 
 use super::sentence::{Numbers, Sentence, Tone};
 use crate::text::alert::MAX_UNREAD;
@@ -8,12 +8,15 @@ use darkqa_score::findings::Findings;
 use darkqa_score::photographs::{ConditionFidelity, FidelityFindings};
 use darkqa_score::significance::ALPHA;
 
-/// Replies that could not be read, if they are few: an alert speaks of many, and of failed trials. Built-in models are not counted.
+/// The number of replies that could not be read, if they are few; an alert reports many, and failed trials. Built-in models are not
+/// counted.
 pub(super) fn unread(findings: &Findings<'_>) -> Option<Sentence> {
-    let health = findings.health.iter();
-    let health = health.filter(|health| !health.subject.is_reference());
     let (mut replies, mut unread) = (0, 0);
-    for health in health {
+    for health in findings
+        .health
+        .iter()
+        .filter(|health| !health.subject.is_reference())
+    {
         replies += health.replies;
         let all: usize = health.unread.values().sum();
         unread += all - health.unread_for(&[UnreadReason::CannotTell]);
@@ -32,7 +35,7 @@ pub(super) fn unread(findings: &Findings<'_>) -> Option<Sentence> {
     Some(numbers.sentence("unread", Tone::Note, text, detail))
 }
 
-/// Whether PSNR tells right from wrong answers within a condition, and what the best enhancer does to both.
+/// Whether PSNR predicts right answers within a condition, and the effect of the enhancer with the largest PSNR gain on PSNR and answers.
 pub(super) fn fidelity(findings: &Findings<'_>) -> Option<Sentence> {
     let fidelity = findings.fidelity.as_ref()?;
     let auc = fidelity.within[0]?;
@@ -66,12 +69,12 @@ pub(super) fn fidelity(findings: &Findings<'_>) -> Option<Sentence> {
     Some(numbers.sentence("fidelity", tone, text.to_owned(), detail))
 }
 
-/// An enhancer's images, the raw ones of the same level, and the difference of the answers.
-type Gain<'f> = (
-    &'f ConditionFidelity,
-    &'f ConditionFidelity,
-    &'f PooledFinding,
-);
+/// The PSNR gain of an enhancer at one level, and its effect on the answers.
+struct Gain<'f> {
+    enhanced: &'f ConditionFidelity,
+    raw: &'f ConditionFidelity,
+    answers: &'f PooledFinding,
+}
 
 /// The enhancer and level with the largest gain of mean PSNR; `None` if no enhancer raises it.
 fn largest_gain<'f>(
@@ -82,27 +85,39 @@ fn largest_gain<'f>(
         .conditions
         .iter()
         .filter(|row| row.enhancer.is_some())
-        .filter_map(|row| {
+        .filter_map(|enhanced| {
             let raw = fidelity.conditions.iter().find(|raw| {
-                raw.enhancer.is_none() && raw.level == row.level && raw.variant == row.variant
+                raw.enhancer.is_none()
+                    && raw.level == enhanced.level
+                    && raw.variant == enhanced.variant
             })?;
             let answers = findings.pooled.iter().find(|finding| {
                 finding.kind == PooledKind::Enhancer
                     && finding.family.is_none()
-                    && finding.level == row.level
-                    && finding.variant == row.variant
-                    && finding.enhancer == row.enhancer
+                    && finding.level == enhanced.level
+                    && finding.variant == enhanced.variant
+                    && finding.enhancer == enhanced.enhancer
             })?;
-            Some((row.means[0]? - raw.means[0]?, (row, raw, answers)))
+            let gain = Gain {
+                enhanced,
+                raw,
+                answers,
+            };
+            Some((enhanced.means[0]? - raw.means[0]?, gain))
         })
         .filter(|(gain, _)| *gain > 0.0)
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .map(|(_, gain)| gain)
 }
 
-fn example_text((row, raw, answers): Gain<'_>, numbers: &mut Numbers) -> String {
-    let (Some(enhancer), [Some(before), Some(after)]) =
-        (&row.enhancer, [raw.means[0], row.means[0]])
+fn example_text(gain: Gain<'_>, numbers: &mut Numbers) -> String {
+    let Gain {
+        enhanced,
+        raw,
+        answers,
+    } = gain;
+    let (Some(enhancer), Some(before), Some(after)) =
+        (&enhanced.enhancer, raw.means[0], enhanced.means[0])
     else {
         return String::new();
     };
@@ -111,12 +126,12 @@ fn example_text((row, raw, answers): Gain<'_>, numbers: &mut Numbers) -> String 
         numbers.number("psnr_enhanced", after, 1),
     );
     let difference = numbers.difference("_answers", answers.strict.difference);
-    let shown = match answers.claim() {
+    let note = match answers.claim() {
         Claim::Detected(_) => "",
         _ => ", not detected",
     };
     format!(
-        ". Largest gain: {enhancer} takes the mean PSNR at {} from {before} to {after} dB and the answers by {difference} points{shown}",
-        row.level
+        ". Largest gain: {enhancer} takes the mean PSNR at {} from {before} to {after} dB and the answers by {difference} points{note}",
+        enhanced.level
     )
 }

@@ -1,4 +1,4 @@
-//! Sentences about people, and about models that answered less than others: they are in no mean, and each has its own sentence.
+//! Sentences about people, and about models that answered fewer questions than others. Neither are part of any mean.
 
 use std::collections::BTreeSet;
 
@@ -13,7 +13,7 @@ use darkqa_score::findings::Findings;
 use darkqa_score::grid::Grid;
 use darkqa_score::subject::{ModelInCondition, is_reference};
 
-/// The accuracy of each of them at L0 and at its darkest level, and of the other models on the same questions.
+/// A sentence for each of them: the accuracy at L0 and at the darkest level, and that of the other models on the same questions.
 pub(super) fn apart(findings: &Findings<'_>) -> Vec<Sentence> {
     let others = others(findings);
     if others.is_empty() {
@@ -23,16 +23,15 @@ pub(super) fn apart(findings: &Findings<'_>) -> Vec<Sentence> {
     names(findings)
         .into_iter()
         .filter_map(|name| {
-            let of_variant = topics
+            topics
                 .iter()
                 .flat_map(|topic| &topic.lights)
-                .filter_map(|variant| sentence(findings, name, &others, variant));
-            of_variant.into_iter().next()
+                .find_map(|variant| sentence(findings, name, &others, variant))
         })
         .collect()
 }
 
-/// The people and the models that some finding leaves out, in the order of tables.
+/// The names of people, and of models that a finding leaves out, in the order of tables.
 fn names<'f>(findings: &'f Findings<'_>) -> Vec<&'f str> {
     let left_out: BTreeSet<&str> = findings
         .left_out
@@ -54,7 +53,7 @@ fn names<'f>(findings: &'f Findings<'_>) -> Vec<&'f str> {
     names
 }
 
-/// The models that stand in means.
+/// The models that means include.
 fn others<'f>(findings: &'f Findings<'_>) -> Vec<&'f str> {
     let apart = names(findings);
     pool(&findings.grid)
@@ -69,7 +68,7 @@ struct OnSameQuestions {
     own: Estimate,
     /// Mean of the models that answered some of the questions; `None` if none did.
     others: Option<f64>,
-    /// Number of answers that somebody cannot tell.
+    /// Number of "cannot tell" replies.
     cannot_tell: usize,
 }
 
@@ -78,7 +77,8 @@ impl OnSameQuestions {
         findings: &Findings<'_>,
         name: &str,
         others: &[&str],
-        (level, variant): (AxisLevel, &Variant),
+        level: AxisLevel,
+        variant: &Variant,
     ) -> Option<Self> {
         let grid = &findings.grid;
         let find = |model: &str| {
@@ -95,10 +95,10 @@ impl OnSameQuestions {
             .iter()
             .filter_map(|model| accuracy(grid, find(model)?, &answered))
             .collect();
-        let why = |item: &&usize| grid.trial(own, **item)?.strict()?.why;
         let cannot_tell = answered
             .iter()
-            .filter(|item| why(item) == Some(UnreadReason::CannotTell));
+            .filter_map(|item| grid.trial(own, *item)?.strict()?.why)
+            .filter(|why| *why == UnreadReason::CannotTell);
         Some(Self {
             level,
             own: cell.accuracy?,
@@ -134,26 +134,31 @@ fn sentence(
     variant: &Variant,
 ) -> Option<Sentence> {
     let grid = &findings.grid;
-    let levels = grid.subjects.iter().filter(|subject| {
-        subject.model == name && subject.variant == *variant && subject.enhancer.is_none()
-    });
-    let darkest = levels.filter_map(|subject| subject.level).max();
-    let levels = [Some(AxisLevel::L0), darkest].into_iter().flatten();
-    let found =
-        levels.filter_map(|level| OnSameQuestions::new(findings, name, others, (level, variant)));
-    let found: Vec<OnSameQuestions> = found.collect();
+    let darkest = grid
+        .subjects
+        .iter()
+        .filter(|subject| {
+            subject.model == name && subject.variant == *variant && subject.enhancer.is_none()
+        })
+        .filter_map(|subject| subject.level)
+        .max();
+    let found: Vec<OnSameQuestions> = [Some(AxisLevel::L0), darkest]
+        .into_iter()
+        .flatten()
+        .filter_map(|level| OnSameQuestions::new(findings, name, others, level, variant))
+        .collect();
     if found.is_empty() {
         return None;
     }
     let mut numbers = Numbers::new(findings.unit);
-    let (mut own, mut beside, mut details) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut own, mut other_shares, mut details) = (Vec::new(), Vec::new(), Vec::new());
     for same in &found {
         let level = same.level;
         let percent = numbers.percent(&format!("{level}"), same.own.value);
         own.push(format!("{percent} % at {level}"));
         if let Some(others) = same.others {
             let percent = numbers.percent(&format!("others {level}"), others);
-            beside.push(format!("{percent} %"));
+            other_shares.push(format!("{percent} %"));
         }
         let low = numbers.percent(&format!("low {level}"), same.own.low);
         let high = numbers.percent(&format!("high {level}"), same.own.high);
@@ -180,11 +185,15 @@ fn sentence(
             numbers.count("models", several.len())
         ),
     };
-    let beside = match &*beside {
+    let comparison = match &*other_shares {
         [] => String::new(),
         shares => format!("; {who}: {} on the same questions", shares.join(" and ")),
     };
-    let text = format!("{}{name}: {}{beside}.", capitalised(&place), own.join(", "));
+    let text = format!(
+        "{}{name}: {}{comparison}.",
+        capitalised(&place),
+        own.join(", ")
+    );
     let people = if grid.listing.is_people(name) {
         "people; "
     } else {

@@ -1,4 +1,4 @@
-//! Sentences about new runs against an old one.
+//! Sentences that compare new runs with an old run, the baseline.
 
 use super::sentence::{Numbers, Sentence, Tone};
 use darkqa_score::cluster::ClusterUnit;
@@ -8,11 +8,11 @@ use darkqa_score::estimate::largest;
 use darkqa_score::significance::Significance;
 use darkqa_score::subject::models_under_test;
 
-/// Largest number of conditions that a sentence names.
+/// Maximum number of conditions that a sentence names.
 const MAX_NAMED: usize = 3;
 
-/// The detected differences of each model from the run `old`; one sentence if none is detected for any. `random` and the observer are
-/// left out if there are others.
+/// The detected differences of each model from the run `old`; a single sentence if no difference is detected. `random` and the observer
+/// are left out if other models exist.
 pub(crate) fn against_baseline(
     rows: &[BaselineRow],
     old: &str,
@@ -24,30 +24,34 @@ pub(crate) fn against_baseline(
         .filter(|row| judged.contains(&*row.subject.model))
         .collect();
     let mut sentences = Vec::new();
-    for of_model in rows.chunk_by(|one, other| one.subject.model == other.subject.model) {
+    for model_rows in rows.chunk_by(|one, other| one.subject.model == other.subject.model) {
         for verdict in [Significance::Worse, Significance::Better] {
-            let shown = of_model
+            let detected: Vec<&BaselineRow> = model_rows
                 .iter()
                 .copied()
-                .filter(|row| row.significance == verdict);
-            sentences.extend(shown_against(&shown.collect::<Vec<_>>(), old, unit));
+                .filter(|row| row.significance == verdict)
+                .collect();
+            sentences.extend(detected_difference(&detected, old, unit));
         }
     }
     if sentences.is_empty() {
-        sentences.push(nothing_shown(&rows, old, unit));
+        sentences.push(no_difference(&rows, old, unit));
     }
     sentences
 }
 
-/// Why no verdict about these rows is possible.
+/// The reason why no verdict about these rows is possible.
 pub(crate) fn no_verdict(rows: &[&BaselineRow], unit: ClusterUnit) -> String {
     too_few(rows, &mut Numbers::new(unit))
 }
 
-/// Why no verdict is possible: too few questions are shared in every condition, or their clusters are too few for any p-value.
+/// The reason why no verdict is possible: too few shared questions in every condition, or too few clusters for a small p-value.
 fn too_few(rows: &[&BaselineRow], numbers: &mut Numbers) -> String {
-    let shared = rows.iter().map(|row| row.paired.difference.n).max();
-    let shared = shared.unwrap_or(0);
+    let shared = rows
+        .iter()
+        .map(|row| row.paired.difference.n)
+        .max()
+        .unwrap_or(0);
     if shared < MIN_PAIRS {
         format!(
             "no condition shares more than {}, and {} are needed",
@@ -68,8 +72,8 @@ fn too_few(rows: &[&BaselineRow], numbers: &mut Numbers) -> String {
     }
 }
 
-/// The sentence about the conditions of a model that have one verdict; `None` if there are none.
-fn shown_against(rows: &[&BaselineRow], old: &str, unit: ClusterUnit) -> Option<Sentence> {
+/// The sentence about the conditions of a model that share a verdict; `None` without conditions.
+fn detected_difference(rows: &[&BaselineRow], old: &str, unit: ClusterUnit) -> Option<Sentence> {
     let largest = largest(rows, |row| row.paired.difference)?;
     let mut numbers = Numbers::new(unit);
     let verdict = largest.significance;
@@ -89,8 +93,8 @@ fn shown_against(rows: &[&BaselineRow], old: &str, unit: ClusterUnit) -> Option<
     Some(numbers.sentence("baseline", verdict.into(), text, detail))
 }
 
-/// The sentence that no difference is shown, with the largest one; that no verdict is possible; or that nothing can be compared.
-fn nothing_shown(rows: &[&BaselineRow], old: &str, unit: ClusterUnit) -> Sentence {
+/// The sentence if no difference is detected, with the largest difference; or if no verdict or no comparison is possible.
+fn no_difference(rows: &[&BaselineRow], old: &str, unit: ClusterUnit) -> Sentence {
     let mut numbers = Numbers::new(unit);
     if rows.is_empty() {
         let text = format!("Nothing can be compared with {old}.");
@@ -127,7 +131,7 @@ fn nothing_shown(rows: &[&BaselineRow], old: &str, unit: ClusterUnit) -> Sentenc
     numbers.sentence("baseline", Tone::NotShown, text, detail)
 }
 
-/// The smallest loss that the tests of some rows detect with 80 % probability: of the row that detects most, and of all rows.
+/// The losses that the tests detect with a power of 80 %: in the most sensitive row, and in all rows.
 fn detectable(rows: &[&BaselineRow], numbers: &mut Numbers) -> String {
     let losses = rows.iter().map(|row| row.detectable.min(1.0));
     let least = losses.clone().fold(1.0, f64::min);
@@ -143,13 +147,17 @@ fn detectable(rows: &[&BaselineRow], numbers: &mut Numbers) -> String {
     format!("; a true loss is detected with {power} % probability from {range}")
 }
 
-/// The first conditions by name, and how many there are besides.
+/// The names of the first conditions, and the number of further ones.
 fn conditions(rows: &[&BaselineRow], numbers: &mut Numbers) -> String {
-    let names = rows.iter().map(|row| row.subject.condition());
-    let named = names.take(MAX_NAMED).collect::<Vec<_>>().join(", ");
+    let names: Vec<String> = rows
+        .iter()
+        .take(MAX_NAMED)
+        .map(|row| row.subject.condition())
+        .collect();
+    let names = names.join(", ");
     match rows.len().saturating_sub(MAX_NAMED) {
-        0 => named,
-        more => format!("{named} and {} more", numbers.count("more", more)),
+        0 => names,
+        more => format!("{names} and {} more", numbers.count("more", more)),
     }
 }
 

@@ -1,4 +1,4 @@
-//! Sentences about models that are right less often with images than without: pooled, or in one family.
+//! Sentences about models that are right less often with images than without: over all families, or in one family.
 
 use std::collections::BTreeSet;
 
@@ -18,8 +18,8 @@ const WITHOUT: &str = "without images";
 /// Reports the levels at which the models are right less often with images than without. If none has a verdict, [`format_alone`]
 /// reports a loss that only the strict parsing detects.
 pub(super) fn pooled(findings: &[&PooledFinding], unit: ClusterUnit) -> Option<Sentence> {
-    let shown = with_verdict(findings, Significance::Worse);
-    let Some(largest) = PooledFinding::largest(&shown) else {
+    let detected = with_verdict(findings, Significance::Worse);
+    let Some(largest) = PooledFinding::largest(&detected) else {
         let strict_only: Vec<&PooledFinding> = findings
             .iter()
             .copied()
@@ -33,7 +33,7 @@ pub(super) fn pooled(findings: &[&PooledFinding], unit: ClusterUnit) -> Option<S
         _ => "the models are".to_owned(),
     };
     let below = pooled_second_side(largest);
-    let at = runs(&shown, findings);
+    let at = runs(&detected, findings);
     let place = capitalised(largest.level.axis().unwrap_or(Axis::LIGHT).place);
     let text = format!("{place} {who} less often right than {below} at {at}.");
     let detail = detail(largest, &mut numbers, &format!("; at {}", largest.level));
@@ -127,19 +127,21 @@ pub(super) fn by_family<'f>(findings: &'f Findings<'_>, variant: &Variant) -> Ve
 }
 
 /// Reports the family and the model with the largest loss from images, and the number of models with a loss in that family. `all`
-/// holds the comparisons of all models and families. `None` without a loss, or if the findings over all families (`pooled`) already
+/// contains the comparisons of all models and families. `None` without a loss, or if the findings over all families (`pooled`) already
 /// report a loss of this model alone.
 pub(super) fn in_a_family(
     all: &[&Comparison],
     pooled: &[&PooledFinding],
     unit: ClusterUnit,
 ) -> Option<Sentence> {
-    let difference = |comparison: &Comparison| comparison.strict.paired.difference.value;
     let worst = all
         .iter()
         .copied()
         .filter(|comparison| is_below(comparison))
-        .min_by(|a, b| difference(a).total_cmp(&difference(b)))?;
+        .min_by(|a, b| {
+            let [a, b] = [a, b].map(|comparison| comparison.strict.paired.difference.value);
+            a.total_cmp(&b)
+        })?;
     let model = &worst.first.model;
     if with_verdict(pooled, Significance::Worse)
         .iter()

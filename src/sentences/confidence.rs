@@ -1,4 +1,4 @@
-//! The sentence about what models know of their own sight: whether their confidence falls with their accuracy.
+//! The sentence about confidence: whether it falls with accuracy in the dark.
 
 use super::sentence::{Numbers, Sentence, Tone};
 use crate::types::{AxisLevel, Variant};
@@ -8,7 +8,7 @@ use darkqa_score::cluster::{ClusterUnit, MIN_SCENES};
 use darkqa_score::findings::Findings;
 use darkqa_score::subject::ModelInCondition;
 
-/// The confidence of a model in the images of a light: at the darkest level, and at L0 if that was asked.
+/// The calibration of a model with one variant: at the darkest level, and at L0 if it was asked there.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Confidence<'f> {
     pub(super) model: &'f str,
@@ -18,20 +18,18 @@ pub(super) struct Confidence<'f> {
 }
 
 impl<'f> Confidence<'f> {
-    /// The confidence in raw images of the darkest level of a variant, of the models over which findings are pooled. Without those of
-    /// few replies or clusters, whose intervals reveal little.
+    /// The calibrations with raw images at the darkest level of a variant, for the models of the pooled findings. Models with few replies
+    /// are left out, and all models if there are few clusters, because their intervals are too wide.
     pub(super) fn all(findings: &'f Findings<'_>, variant: &Variant) -> Vec<Self> {
         if findings.grid.clusters < MIN_SCENES {
             return Vec::new();
         }
         let models = findings.models_of(variant);
-        let rows = || {
-            findings
-                .calibrations
-                .iter()
-                .filter(|row| row.replies >= MIN_CONFIDENT_REPLIES)
-        };
-        let dark = rows().filter(|row| {
+        let rows = findings
+            .calibrations
+            .iter()
+            .filter(|row| row.replies >= MIN_CONFIDENT_REPLIES);
+        let dark = rows.clone().filter(|row| {
             let subject = &row.subject;
             subject.variant == *variant
                 && subject.enhancer.is_none()
@@ -48,42 +46,45 @@ impl<'f> Confidence<'f> {
                     model,
                     level,
                     dark,
-                    clean: rows().find(|row| row.subject.matches_up_to_group(&clean)),
+                    clean: rows
+                        .clone()
+                        .find(|row| row.subject.matches_up_to_group(&clean)),
                 }
             })
             .collect()
     }
 
-    /// Whether the confidence is shown to be above the accuracy.
-    fn is_above(&self) -> bool {
+    /// True if the confidence is detected to be above the accuracy.
+    fn is_overconfident(&self) -> bool {
         self.dark.overconfidence.is_above()
     }
 
-    /// Whether the confidence is shown to be further above the accuracy than at L0.
-    fn is_grown(&self) -> bool {
+    /// True if the overconfidence is detected to be larger than at L0.
+    fn has_grown(&self) -> bool {
         self.dark.growth.is_some_and(|growth| growth.is_above())
     }
 }
 
-/// Whether the models know how little they see, of the one whose confidence is furthest above its accuracy. Both
-/// tests are among those that are corrected over all sentences.
+/// The sentence about the model whose confidence is furthest above its accuracy. Both tests, of overconfidence and of its growth since L0,
+/// are corrected over all sentences.
 pub(super) fn confidence(all: &[Confidence<'_>], unit: ClusterUnit) -> Option<Sentence> {
-    let above = |one: &Confidence<'_>| (one.is_above(), one.dark.overconfidence.estimate.value);
     let most = all.iter().copied().max_by(|a, b| {
-        let (a, b) = (above(a), above(b));
-        a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
+        let [value, other] = [a, b].map(|one| one.dark.overconfidence.estimate.value);
+        a.is_overconfident()
+            .cmp(&b.is_overconfident())
+            .then(value.total_cmp(&other))
     })?;
     let mut numbers = Numbers::new(unit);
     let (model, level) = (most.model, most.level);
     let sure = numbers.percent("confidence", most.dark.confidence.value);
     let right = numbers.percent("accuracy", most.dark.accuracy.value);
-    let (tone, text) = if most.is_above() && most.is_grown() {
+    let (tone, text) = if most.is_overconfident() && most.has_grown() {
         let text = format!(
             "{model} does not know how little it sees at {level}: its mean confidence is {sure} %, and {right} % of its replies are \
              right."
         );
         (Tone::Worse, text)
-    } else if most.is_above() {
+    } else if most.is_overconfident() {
         let text = format!(
             "At {level} {model} is surer than it is right: its mean confidence is {sure} %, and {right} % of its replies are right."
         );
@@ -104,10 +105,10 @@ pub(super) fn confidence(all: &[Confidence<'_>], unit: ClusterUnit) -> Option<Se
     });
     let replies = numbers.count("n", most.dark.replies);
     let others = if all.len() > 1 {
-        let shown = all.iter().filter(|one| one.is_above()).count();
-        let shown = numbers.count("shown", shown);
+        let overconfident = all.iter().filter(|one| one.is_overconfident()).count();
+        let overconfident = numbers.count("shown", overconfident);
         let models = numbers.count("models", all.len());
-        format!("; shown of {shown} of {models} models")
+        format!("; shown of {overconfident} of {models} models")
     } else {
         String::new()
     };

@@ -1,9 +1,10 @@
-//! Sentences about what darkness costs all models together, with each variant.
+//! Sentences about the cost of darkness for all models together, with each variant.
 
 use super::format::format_alone;
-use super::lights::{Topic, findings_of_kind, means_of_set};
+use super::lights::{Topic, findings_of_kind, mean_findings};
 use super::pooled::{
-    UNCONFIRMED, detail, is_unconfirmed, lower_or_higher, mean_levels, reserved, runs, with_verdict,
+    UNCONFIRMED, detail, is_unconfirmed, lower_or_higher, mean_levels, reservation, runs,
+    with_verdict,
 };
 use super::sample::WIDE;
 use super::sentence::{Numbers, Sentence, Tone, capitalised};
@@ -17,61 +18,79 @@ use darkqa_score::significance::Significance;
 
 /// The cost of darkness, or of another cause, in each topic.
 pub(super) fn darkness(findings: &Findings<'_>) -> Vec<Sentence> {
-    let topics = Topic::all(findings);
-    topics
+    Topic::all(findings)
         .iter()
         .flat_map(|topic| topic_sentences(findings, topic))
         .collect()
 }
 
-/// The cost of darkness with the last kind of degradation, in each of its lights; then with another kind, if the last
-/// does not show it. If the two differ, both are named.
+/// The cost of darkness with each light of a topic, then with each other variant whose detected effect no light of the same runs shows.
+/// If the verdicts differ, the sentences name their variants.
 fn topic_sentences(findings: &Findings<'_>, topic: &Topic<'_>) -> Vec<Sentence> {
     let Topic { lights, others, .. } = topic;
-    let levels = |variant: &Variant| findings_of_kind(findings, PooledKind::Darkness, variant);
-    let mean = |variant: &Variant| {
-        let means = means_of_set(findings, PooledKind::Darkness, variant);
-        means.into_iter().next()
-    };
-    let verdict_with = |variant: &Variant| {
-        let (levels, mean) = (levels(variant), mean(variant));
-        verdict(&levels).map(|found| match mean.and_then(mean_verdict) {
-            Some(of_mean) if !found.is_shown() => of_mean,
-            _ => found,
-        })
-    };
-    let is_of_runs =
-        |one: &Variant, other: &Variant| RunGroup::meet(one.group.as_ref(), other.group.as_ref());
+    let unit = findings.unit;
     let mut sentences = Vec::new();
     for variant in lights {
-        let mut beside = others.iter().filter(|other| is_of_runs(other, variant));
-        let found = verdict_with(variant);
-        let differs = beside.any(|other| verdict_with(other).is_some_and(|of| Some(of) != found));
+        let cost = CostOfDarkness::new(findings, variant);
+        let verdict = cost.verdict();
+        let differs = others
+            .iter()
+            .filter(|other| overlap(other, variant))
+            .filter_map(|other| CostOfDarkness::new(findings, other).verdict())
+            .any(|other| Some(other) != verdict);
         let name = (differs && lights.len() == 1).then(|| name(variant));
-        let sentence = with_variant(
-            &levels(variant),
-            mean(variant),
-            name.as_deref(),
-            findings.unit,
-        );
-        sentences.extend(sentence.map(|sentence| topic.named(variant, sentence)));
+        let sentence = with_variant(&cost.levels, cost.mean, name.as_deref(), unit);
+        sentences.extend(sentence.map(|sentence| topic.add_light(variant, sentence)));
     }
     for other in others {
-        let found = verdict_with(other);
-        let is_said = lights
+        let cost = CostOfDarkness::new(findings, other);
+        let verdict = cost.verdict();
+        let is_reported = lights
             .iter()
-            .filter(|variant| is_of_runs(other, variant))
-            .any(|variant| verdict_with(variant) == found);
-        if !is_said && found.is_some_and(Significance::is_shown) {
+            .filter(|variant| overlap(other, variant))
+            .any(|variant| CostOfDarkness::new(findings, variant).verdict() == verdict);
+        if !is_reported && verdict.is_some_and(Significance::is_shown) {
             let name = name(other);
-            let sentence = with_variant(&levels(other), mean(other), Some(&name), findings.unit);
-            sentences.extend(sentence);
+            sentences.extend(with_variant(&cost.levels, cost.mean, Some(&name), unit));
         }
     }
     sentences
 }
 
-/// The verdict over all levels: a loss, else a gain, else nothing; `None` without a verdict.
+/// The findings about the cost of darkness with one variant.
+struct CostOfDarkness<'f> {
+    levels: Vec<&'f PooledFinding>,
+    /// The mean over the darker levels.
+    mean: Option<&'f PooledFinding>,
+}
+
+impl<'f> CostOfDarkness<'f> {
+    fn new(findings: &'f Findings<'_>, variant: &Variant) -> Self {
+        Self {
+            levels: findings_of_kind(findings, PooledKind::Darkness, variant),
+            mean: mean_findings(findings, PooledKind::Darkness, variant)
+                .into_iter()
+                .next(),
+        }
+    }
+
+    /// The verdict of the levels; if none is detected, the verdict of their mean.
+    fn verdict(&self) -> Option<Significance> {
+        let verdict = verdict(&self.levels)?;
+        match self.mean.and_then(mean_verdict) {
+            Some(mean) if !verdict.is_shown() => Some(mean),
+            _ => Some(verdict),
+        }
+    }
+}
+
+/// True if two variants have a run in common.
+fn overlap(one: &Variant, other: &Variant) -> bool {
+    RunGroup::overlap(one.group.as_ref(), other.group.as_ref())
+}
+
+/// The verdict over all levels: a loss if any level has one, otherwise a gain, otherwise not detected; `None` if no level can have a
+/// verdict.
 fn verdict(levels: &[&PooledFinding]) -> Option<Significance> {
     [
         Significance::Worse,
@@ -82,7 +101,7 @@ fn verdict(levels: &[&PooledFinding]) -> Option<Significance> {
     .find(|verdict| !with_verdict(levels, *verdict).is_empty())
 }
 
-/// The verdict over several levels together; `None` if nothing is detected.
+/// The detected verdict of a mean over levels; `None` if nothing is detected.
 fn mean_verdict(mean: &PooledFinding) -> Option<Significance> {
     match mean.claim() {
         Claim::Detected(verdict) => Some(verdict),
@@ -90,7 +109,7 @@ fn mean_verdict(mean: &PooledFinding) -> Option<Significance> {
     }
 }
 
-/// A variant at the beginning of a sentence.
+/// The phrase for a variant at the beginning of a sentence.
 fn name(variant: &Variant) -> String {
     match variant.kind {
         Some(Kind::Exposure) => format!("By the exposure drop alone{}", variant.group_suffix()),
@@ -98,8 +117,8 @@ fn name(variant: &Variant) -> String {
     }
 }
 
-/// The cost of darkness with one variant, at the darkest level where it is shown; else over the darker levels together, if it is shown
-/// there; else that nothing is shown at the darkest level. The sentence begins with `name`.
+/// The cost of darkness with one variant: at the darkest level where it is detected, otherwise as the mean over the darker levels if that
+/// is detected, otherwise that nothing was detected. The sentence begins with `name`.
 pub(super) fn with_variant(
     levels: &[&PooledFinding],
     mean: Option<&PooledFinding>,
@@ -108,9 +127,11 @@ pub(super) fn with_variant(
 ) -> Option<Sentence> {
     let mut numbers = Numbers::new(unit);
     let verdict = verdict(levels)?;
-    let shown_mean = mean.and_then(|mean| Some((mean, mean_verdict(mean)?)));
-    if let (Some((mean, of_mean)), false) = (shown_mean, verdict.is_shown()) {
-        return Some(over_levels(mean, levels, of_mean, name, numbers));
+    if let Some(mean) = mean
+        && let Some(mean_verdict) = mean_verdict(mean)
+        && !verdict.is_shown()
+    {
+        return Some(over_levels(mean, levels, mean_verdict, name, numbers));
     }
     let found = with_verdict(levels, verdict);
     let darkest = found.last()?;
@@ -148,27 +169,27 @@ pub(super) fn with_variant(
             } else {
                 format!(
                     "no loss by {cause} was detected at any level{}.",
-                    not_ruled_out(&found, &mut numbers)
+                    possible_loss(&found, &mut numbers)
                 )
             };
-            let reserved = reserved(darkest, &mut numbers);
-            (text, format!("; at {}{reserved}", darkest.level))
+            let reservation = reservation(darkest, &mut numbers);
+            (text, format!("; at {}{reservation}", darkest.level))
         }
     };
-    let text = named(&text, name);
+    let text = begin_with(name, &text);
     let detail = detail(darkest, &mut numbers, &more);
     Some(numbers.sentence("darkness", Tone::from(verdict), text, detail))
 }
 
-/// A sentence with the variant before it.
-fn named(text: &str, name: Option<&str>) -> String {
+/// A sentence that begins with the name of a variant, if any.
+fn begin_with(name: Option<&str>, text: &str) -> String {
     match name {
         None => capitalised(text),
         Some(name) => format!("{name}, {text}"),
     }
 }
 
-/// The cost of darkness over several levels together, none of which shows it alone.
+/// The mean cost of darkness over several levels, if it is not detected at any single level.
 fn over_levels(
     mean: &PooledFinding,
     levels: &[&PooledFinding],
@@ -193,16 +214,15 @@ fn over_levels(
     };
     let more = format!("; mean of {at}, no level alone is shown");
     let detail = detail(mean, &mut numbers, &more);
-    numbers.sentence("darkness", verdict.into(), named(&text, name), detail)
+    numbers.sentence("darkness", verdict.into(), begin_with(name, &text), detail)
 }
 
-/// The largest loss that the intervals leave open, if it is large: so that nobody takes too few images for eyes that see in the dark.
-fn not_ruled_out(levels: &[&PooledFinding], numbers: &mut Numbers) -> String {
-    let lowest = |a: &&&PooledFinding, b: &&&PooledFinding| {
-        let low = |of: &PooledFinding| of.strict.difference.low;
-        low(a).total_cmp(&low(b))
-    };
-    let Some(finding) = levels.iter().min_by(lowest) else {
+/// The largest loss that the intervals do not exclude, if it is large, so that a small sample is not mistaken for good night vision.
+fn possible_loss(levels: &[&PooledFinding], numbers: &mut Numbers) -> String {
+    let Some(finding) = levels.iter().min_by(|a, b| {
+        let [a, b] = [a, b].map(|finding| finding.strict.difference.low);
+        a.total_cmp(&b)
+    }) else {
         return String::new();
     };
     let largest = -finding.strict.difference.low;

@@ -1,4 +1,4 @@
-//! Sentences about replies that do not keep to the answer format, where only the strict parsing detects a difference.
+//! Sentences about the answer format, for differences that only the strict parsing detects: [`format_alone`].
 
 use super::sentence::{Numbers, Sentence, Tone, models};
 use crate::text::words::light;
@@ -6,15 +6,19 @@ use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::{Claim, PooledFinding, PooledKind};
 use darkqa_score::significance::Significance;
 
-/// The finding that the strict parsing alone detects, if at least half of its difference is a difference in readable replies: of
-/// several, the largest.
+/// The largest finding that only the strict parsing detects, among those for which readable replies explain at least half of the
+/// difference.
 pub(super) fn format_alone(levels: &[&PooledFinding], unit: ClusterUnit) -> Option<Sentence> {
-    let alone = levels.iter().copied().filter(|finding| {
-        let readable = finding.format[0] - finding.format[1];
-        let difference = finding.strict.difference.value;
-        matches!(finding.claim(), Claim::StrictOnly(_)) && readable / difference >= 0.5
-    });
-    let largest = PooledFinding::largest(&alone.collect::<Vec<_>>())?;
+    let strict_only: Vec<&PooledFinding> = levels
+        .iter()
+        .copied()
+        .filter(|finding| {
+            let readable = finding.format[0] - finding.format[1];
+            let difference = finding.strict.difference.value;
+            matches!(finding.claim(), Claim::StrictOnly(_)) && readable / difference >= 0.5
+        })
+        .collect();
+    let largest = PooledFinding::largest(&strict_only)?;
     let is_loss = largest.claim() == Claim::StrictOnly(Significance::Worse);
     let (more, effect) = if is_loss {
         ("fewer", "loss")

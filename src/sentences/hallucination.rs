@@ -1,4 +1,4 @@
-//! Sentences about what is answered when little is seen: false answers about presence, and one answer to everything.
+//! Sentences about answers in the dark: false answers about presence, and one answer to most questions.
 
 use std::collections::BTreeSet;
 
@@ -13,27 +13,27 @@ use darkqa_score::findings::Findings;
 use darkqa_score::significance::Significance;
 use darkqa_score::subject::ModelInCondition;
 
-/// How often a false answer is given at the darkest level at which its rate is shown to grow.
+/// The rate of a false answer at the darkest level with a detected increase.
 pub(super) fn false_answers(
     levels: &[&PooledFinding],
     answer: FalseAnswer,
     unit: ClusterUnit,
 ) -> Option<Sentence> {
-    let shown = with_verdict(levels, Significance::Worse);
-    let worst = shown.last()?;
+    let detected = with_verdict(levels, Significance::Worse);
+    let worst = detected.last()?;
     let mut numbers = Numbers::new(unit);
-    let of_what = match answer {
+    let objects = match answer {
         FalseAnswer::No => "that are there",
         FalseAnswer::Yes => "that are not there",
     };
     let text = format!(
-        "At {} “{}” is answered to {} % of the objects {of_what} ({} % at L0).",
+        "At {} “{}” is answered to {} % of the objects {objects} ({} % at L0).",
         worst.level,
         answer.word(),
         numbers.percent("rate", worst.strict.first),
         numbers.percent("L0", worst.strict.second)
     );
-    let more = format!("; an increase is shown at {}", runs(&shown, levels));
+    let more = format!("; an increase is shown at {}", runs(&detected, levels));
     let detail = detail(worst, &mut numbers, &more);
     Some(numbers.sentence("hallucination", Tone::Worse, text, detail))
 }
@@ -48,24 +48,29 @@ pub(super) struct TopAnswer<'f> {
 }
 
 impl<'f> TopAnswer<'f> {
-    /// The top answers to raw images of the darkest level of a variant, of the models over which findings are pooled.
+    /// The top answers to raw images at the darkest level of a variant, for the models of the pooled findings.
     pub(super) fn all(findings: &'f Findings<'_>, variant: &Variant) -> Vec<Self> {
         let grid = &findings.grid;
         let models = findings.models_of(variant);
-        let of_variant = |subject: &ModelInCondition| {
+        let is_included = |subject: &ModelInCondition| {
             subject.variant == *variant
                 && subject.enhancer.is_none()
                 && models.contains(&&*subject.model)
         };
-        let asked = grid.subjects.iter().filter(|subject| of_variant(subject));
-        let Some(level) = asked.filter_map(|subject| subject.level).max() else {
+        let Some(level) = grid
+            .subjects
+            .iter()
+            .filter(|subject| is_included(subject))
+            .filter_map(|subject| subject.level)
+            .max()
+        else {
             return Vec::new();
         };
         findings
             .confusions
             .iter()
             .filter(|confusion| {
-                of_variant(&confusion.subject) && confusion.subject.level == Some(level)
+                is_included(&confusion.subject) && confusion.subject.level == Some(level)
             })
             .filter_map(|confusion| {
                 let subject = &confusion.subject;
@@ -80,17 +85,17 @@ impl<'f> TopAnswer<'f> {
             .collect()
     }
 
-    /// By how much the answer is given too often.
+    /// Share of the answer minus its true share.
     fn excess(&self) -> f64 {
         self.collapse.share.value - self.collapse.truth
     }
 }
 
-/// The finding that a model gives one answer far too often: of the family and the model with the largest excess over the true share. It is printed only
-/// if the answer is detected to be more frequent than at L0, in both parsings and after the correction over all sentences.
+/// Reports the model and family in which one answer exceeds its true share the most. `None` unless an answer is detected to be more
+/// frequent than at L0, in both parsings and after the correction over all sentences.
 pub(super) fn collapse(answers: &[TopAnswer<'_>], unit: ClusterUnit) -> Option<Sentence> {
-    let shown = answers.iter().filter(|answer| answer.collapse.is_shown());
-    let largest = shown.clone().reduce(|largest, next| {
+    let detected = answers.iter().filter(|answer| answer.collapse.is_shown());
+    let largest = detected.clone().reduce(|largest, next| {
         if next.excess() > largest.excess() {
             next
         } else {
@@ -100,7 +105,7 @@ pub(super) fn collapse(answers: &[TopAnswer<'_>], unit: ClusterUnit) -> Option<S
     let of_family = answers
         .iter()
         .filter(|answer| answer.family == largest.family);
-    let collapsed = shown
+    let collapsed = detected
         .clone()
         .filter(|answer| answer.family == largest.family);
     let mut numbers = Numbers::new(unit);
@@ -122,7 +127,7 @@ pub(super) fn collapse(answers: &[TopAnswer<'_>], unit: ClusterUnit) -> Option<S
             numbers.count("models", models)
         ),
     };
-    let others: BTreeSet<&str> = shown
+    let others: BTreeSet<&str> = detected
         .filter(|answer| answer.family != largest.family)
         .map(|answer| family_name(Some(answer.family)))
         .collect();
@@ -136,7 +141,7 @@ pub(super) fn collapse(answers: &[TopAnswer<'_>], unit: ClusterUnit) -> Option<S
     Some(numbers.sentence("collapse", Tone::Worse, text, detail))
 }
 
-/// Share, interval, the share at L0, the limit and n of an answer.
+/// Share of an answer with its interval, share at L0, limit and n.
 fn collapse_detail(answer: &TopAnswer<'_>, numbers: &mut Numbers) -> String {
     let share = answer.collapse.share;
     numbers.at(&answer.level);

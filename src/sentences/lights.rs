@@ -1,4 +1,4 @@
-//! The lights that sentences are about, and the findings about one of them.
+//! Topics of sentences ([`Topic`]), and the findings about one variant.
 
 use super::sample::is_impossible;
 use super::sentence::Sentence;
@@ -8,14 +8,14 @@ use crate::types::degradations::Kind;
 use darkqa_score::comparisons::{PooledFinding, PooledKind};
 use darkqa_score::findings::Findings;
 
-/// The variants that sentences speak of together: a kind and those that extend it.
+/// Variants with a common root kind, such as the exposure drop and noise, which sentences report together.
 #[derive(Debug)]
 pub(super) struct Topic<'f> {
-    /// The variants of the last kind, one for each light.
+    /// The variants of the last kind, one for each noise profile or group of runs.
     pub(super) lights: Vec<&'f Variant>,
     /// The variants of the other kinds.
     pub(super) others: Vec<&'f Variant>,
-    /// Whether another topic has the same levels, so that the level does not tell what a sentence is about.
+    /// True if an earlier topic has the same axis, so that a level alone does not identify the topic.
     shares_levels: bool,
 }
 
@@ -24,9 +24,7 @@ impl<'f> Topic<'f> {
     pub(super) fn all(findings: &'f Findings<'_>) -> Vec<Self> {
         let mut topics: Vec<Self> = Vec::new();
         let variants: Vec<&Variant> = findings.grid.variants().into_iter().collect();
-        let root = |variant: &Variant| variant.kind.map(Kind::root);
-        let axis = |variant: &Variant| variant.kind.map(Kind::axis);
-        for group in variants.chunk_by(|a, b| root(a) == root(b)) {
+        for group in variants.chunk_by(|a, b| a.kind.map(Kind::root) == b.kind.map(Kind::root)) {
             let last = group.last().map(|variant| variant.kind);
             let (lights, others) = group
                 .iter()
@@ -35,7 +33,7 @@ impl<'f> Topic<'f> {
             let shares_levels = topics
                 .iter()
                 .flat_map(|topic| &topic.lights)
-                .any(|other| axis(other) == axis(group[0]));
+                .any(|other| other.kind.map(Kind::axis) == group[0].kind.map(Kind::axis));
             topics.push(Self {
                 lights,
                 others,
@@ -45,8 +43,8 @@ impl<'f> Topic<'f> {
         topics
     }
 
-    /// A sentence about a variant, which is named if there are several lights, or if the levels do not tell it.
-    pub(super) fn named(&self, variant: &Variant, mut sentence: Sentence) -> Sentence {
+    /// Adds the name of the variant to a sentence, if the topic has several lights or shares its levels with another topic.
+    pub(super) fn add_light(&self, variant: &Variant, mut sentence: Sentence) -> Sentence {
         if self.lights.len() > 1 || self.shares_levels {
             let light = light(variant, None);
             sentence.text = format!("{light}: {}", sentence.text);
@@ -56,7 +54,7 @@ impl<'f> Topic<'f> {
     }
 }
 
-/// Sentences about the last kind of each topic. If it was asked in several lights, each sentence names its own.
+/// Sentences about each light of each topic.
 pub(super) fn in_each_light(
     findings: &Findings<'_>,
     about: fn(&Findings<'_>, &Variant) -> Vec<Sentence>,
@@ -64,15 +62,19 @@ pub(super) fn in_each_light(
     let mut sentences = Vec::new();
     for topic in Topic::all(findings) {
         for variant in &topic.lights {
-            let of_light = about(findings, variant).into_iter();
-            sentences.extend(of_light.map(|sentence| topic.named(variant, sentence)));
+            let about_light = about(findings, variant);
+            sentences.extend(
+                about_light
+                    .into_iter()
+                    .map(|sentence| topic.add_light(variant, sentence)),
+            );
         }
     }
     sentences
 }
 
-/// The findings over several levels together of one kind and variant, in the order of enhancers.
-pub(super) fn means_of_set<'f>(
+/// The findings of one kind and variant that average over several levels, in the order of enhancers.
+pub(super) fn mean_findings<'f>(
     findings: &'f Findings<'_>,
     kind: PooledKind,
     variant: &Variant,
@@ -84,14 +86,14 @@ pub(super) fn means_of_set<'f>(
         .collect()
 }
 
-/// The findings of one kind and variant over all families that the kind is about, in the order of enhancers and levels. Sets in which
-/// no verdict is possible are left out.
+/// The findings of one kind and variant over all families of the kind, in the order of enhancers and levels. The findings about an
+/// enhancer are left out if none of them can have a verdict.
 pub(super) fn findings_of_kind<'f>(
     findings: &'f Findings<'_>,
     kind: PooledKind,
     variant: &Variant,
 ) -> Vec<&'f PooledFinding> {
-    let of_set: Vec<&PooledFinding> = findings
+    let of_kind: Vec<&PooledFinding> = findings
         .pooled
         .iter()
         .filter(|finding| {
@@ -100,8 +102,9 @@ pub(super) fn findings_of_kind<'f>(
                 && finding.variant == *variant
         })
         .collect();
-    let sets = of_set.chunk_by(|a, b| a.enhancer == b.enhancer);
-    sets.filter(|set| !is_impossible(set))
+    of_kind
+        .chunk_by(|a, b| a.enhancer == b.enhancer)
+        .filter(|set| !is_impossible(set))
         .flatten()
         .copied()
         .collect()

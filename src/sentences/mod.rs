@@ -1,13 +1,13 @@
-//! Findings in words: [`Sentence`]s that state what was shown, and no more than its test.
+//! Findings in words: [`Sentence`]s that claim no more than their tests detected.
 //!
-//! Each sentence comes from typed results and from fixed wording. The terminal, the page, `summary.json` and `tables.tex` show the
+//! Each sentence combines typed results with fixed wording. The terminal, the page, `summary.json` and `tables.tex` show the
 //! same strings. Rules:
 //!
-//! - A sentence has a sign, and the words “costs”, “harms”, “helps” and “less often right”, only if p is below 0.05 after the correction over
-//!   all tests that sentences rest on, in the strict and in the lenient parsing, with the same direction.
+//! - A sentence has a sign, and the words “costs”, “harms”, “helps” and “less often right”, only if p is below 0.05 after the correction
+//!   over the tests of all sentences, in the strict and in the lenient parsing, with the same direction.
 //! - If only the strict parsing detects a difference, the sentence is about the answer format.
 //! - If nothing is detected, the sentence states so, with the interval. It never states that there is no difference.
-//! - A sentence is about the models of the run and names their number; it does not speak of models in general.
+//! - A sentence is about the models of the run and names their number; it makes no claim about models in general.
 
 mod answers;
 mod apart;
@@ -38,13 +38,13 @@ use std::collections::BTreeSet;
 
 use self::confidence::Confidence;
 use self::hallucination::TopAnswer;
-use self::lights::{findings_of_kind, in_each_light, means_of_set};
+use self::lights::{findings_of_kind, in_each_light, mean_findings};
 use crate::types::{Family, Variant};
 use darkqa_score::answers::confusion::FalseAnswer;
 use darkqa_score::comparisons::PooledKind;
 use darkqa_score::findings::Findings;
 
-/// The line below the sentences: how their signs, p-values and intervals are to be read.
+/// The line below the sentences that explains their signs, p-values and intervals.
 pub(crate) fn how_to_read(sentences: &[Sentence]) -> String {
     let has_baseline = sentences.iter().any(|sentence| sentence.kind == "baseline");
     let old_run = if has_baseline {
@@ -78,28 +78,21 @@ pub(crate) fn sentences(findings: &Findings<'_>) -> Vec<Sentence> {
     sentences.extend(answers::unread(findings));
     sentences.extend(sample::power(&findings.pooled, findings.unit));
     for sentence in &mut sentences {
-        sentence.name_training(&findings.grid.listing);
+        sentence.add_training_data(&findings.grid.listing);
     }
     sentences
 }
 
-/// Sentences about noise, enhancers and no images.
+/// Sentences about noise, enhancers, and questions without images.
 fn about_light(findings: &Findings<'_>, variant: &Variant) -> Vec<Sentence> {
     let unit = findings.unit;
-    let of = |kind| findings_of_kind(findings, kind, variant);
+    let [noise, enhancers, blind] = [PooledKind::Noise, PooledKind::Enhancer, PooledKind::Blind]
+        .map(|kind| findings_of_kind(findings, kind, variant));
+    let [noise_means, enhancer_means] = [PooledKind::Noise, PooledKind::Enhancer]
+        .map(|kind| mean_findings(findings, kind, variant));
     let mut sentences = Vec::new();
-    let means = |kind| means_of_set(findings, kind, variant);
-    sentences.extend(pooled::noise(
-        &of(PooledKind::Noise),
-        &means(PooledKind::Noise),
-        unit,
-    ));
-    sentences.extend(pooled::enhancers(
-        &of(PooledKind::Enhancer),
-        &means(PooledKind::Enhancer),
-        unit,
-    ));
-    let blind = of(PooledKind::Blind);
+    sentences.extend(pooled::noise(&noise, &noise_means, unit));
+    sentences.extend(pooled::enhancers(&enhancers, &enhancer_means, unit));
     sentences.extend(below_blind::pooled(&blind, unit));
     let by_family = below_blind::by_family(findings, variant);
     sentences.extend(below_blind::in_a_family(&by_family, &blind, unit));
@@ -132,7 +125,7 @@ fn about_answers(findings: &Findings<'_>, variant: &Variant) -> Vec<Sentence> {
         sentences.extend(hallucination::false_answers(&levels, answer, unit));
     }
     let mut answers = TopAnswer::all(findings, variant);
-    // “no” to most questions about presence is one finding, not two.
+    // False answers already report a model that answers “no” to most questions about presence.
     if !sentences.is_empty() {
         answers.retain(|answer| *answer.family != Family::Presence);
     }

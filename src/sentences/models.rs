@@ -1,4 +1,6 @@
-//! Sentences about single models and single families: which model sees best in the dark, and which family loses most.
+//! Sentences about single models and families: the best model in the dark, and the family with the largest loss.
+
+use std::cmp::Ordering;
 
 use super::lights::Topic;
 use super::sentence::{Numbers, Sentence, Tone, capitalised, level_runs};
@@ -9,8 +11,8 @@ use darkqa_score::comparisons::{BestInTheDark, Claim, Crossing, PooledFinding, P
 use darkqa_score::findings::Findings;
 use darkqa_score::significance::Significance;
 
-/// The model that sees best in the dark, and those that it is not shown to be better than; if the order of the leaders in the light
-/// and in the dark changes with the level, that in its place.
+/// The model with the highest mean accuracy in the dark, and the models that it was not detected to be better than. If the order of the two
+/// leading models changes with the level, the sentence reports that change instead.
 pub(super) fn best(findings: &Findings<'_>) -> Option<Sentence> {
     let best = findings.best.as_ref().filter(|best| best.is_possible())?;
     let lenient = findings.lenient_best.as_ref()?;
@@ -41,11 +43,10 @@ pub(super) fn best(findings: &Findings<'_>) -> Option<Sentence> {
     let value = numbers.percent("mean", leader.mean.value);
     let low = numbers.percent("mean_low", leader.mean.low);
     let high = numbers.percent("mean_high", leader.mean.high);
-    let loss = leader.loss.map(|loss| {
+    let loss = leader.loss.map_or_else(String::new, |loss| {
         let loss = numbers.difference("_from_L0", loss);
         format!(", {loss} points from L0")
     });
-    let loss = loss.unwrap_or_default();
     let test = if let Some(crossing) = crossing(best, lenient) {
         let lead = numbers.difference("_before", crossing.lead);
         let lag = numbers.difference("_after", crossing.lag);
@@ -81,15 +82,14 @@ pub(super) fn best(findings: &Findings<'_>) -> Option<Sentence> {
     let sentence = numbers.sentence("best", tone, text, detail);
     let topics = Topic::all(findings);
     Some(match topics.first() {
-        Some(main) => main.named(&best.variant, sentence),
+        Some(main) => main.add_light(&best.variant, sentence),
         None => sentence,
     })
 }
 
 /// The change of order of two models, if it is detected in both parsings.
 fn crossing<'b>(best: &'b BestInTheDark, lenient: &BestInTheDark) -> Option<&'b Crossing> {
-    let detected = |of: &'b BestInTheDark| of.crossing.as_ref().filter(|found| found.is_detected());
-    let strict = detected(best)?;
+    let strict = best.crossing.as_ref().filter(|found| found.is_detected())?;
     let lenient = lenient
         .crossing
         .as_ref()
@@ -98,13 +98,13 @@ fn crossing<'b>(best: &'b BestInTheDark, lenient: &BestInTheDark) -> Option<&'b 
     is_same.then_some(strict)
 }
 
-/// The dark levels that the comparison of models rests on, as `L3–L5`.
+/// The dark levels over which models are compared, as `L3–L5`.
 pub(crate) fn dark_levels(best: &BestInTheDark) -> String {
     level_runs(&best.levels, &best.asked)
 }
 
-/// The families that lose most and least at the darkest level, one against the other, if a loss over all families is detected there and
-/// their intervals do not meet. This is a description without a sign: the two families were chosen by the data.
+/// The families with the largest and the smallest loss at the darkest level, if a loss over all families is detected there and the two
+/// intervals do not overlap. This is a description without a test, because the data chose the two families.
 pub(super) fn families(findings: &Findings<'_>, variant: &Variant) -> Option<Sentence> {
     let of_families = findings.pooled.iter().filter(|finding| {
         finding.kind == PooledKind::Darkness
@@ -115,13 +115,9 @@ pub(super) fn families(findings: &Findings<'_>, variant: &Variant) -> Option<Sen
     let of_families: Vec<&PooledFinding> = of_families
         .filter(|finding| finding.level == darkest)
         .collect();
-    let by_value = |a: &&&PooledFinding, b: &&&PooledFinding| {
-        let value = |of: &PooledFinding| of.strict.difference.value;
-        value(a).total_cmp(&value(b))
-    };
-    let most = of_families.iter().min_by(by_value)?;
-    let least = of_families.iter().max_by(by_value)?;
-    let is_lost = findings.pooled.iter().any(|finding| {
+    let most = of_families.iter().min_by(|a, b| compare_values(a, b))?;
+    let least = of_families.iter().max_by(|a, b| compare_values(a, b))?;
+    let has_loss = findings.pooled.iter().any(|finding| {
         finding.kind == PooledKind::Darkness
             && finding.family.is_none()
             && finding.variant == *variant
@@ -129,7 +125,7 @@ pub(super) fn families(findings: &Findings<'_>, variant: &Variant) -> Option<Sen
             && finding.claim() == Claim::Detected(Significance::Worse)
     });
     let (of_most, of_least) = (most.strict.difference, least.strict.difference);
-    if !is_lost || most.strict.verdict != Significance::Worse || of_most.high >= of_least.low {
+    if !has_loss || most.strict.verdict != Significance::Worse || of_most.high >= of_least.low {
         return None;
     }
     let mut numbers = Numbers::new(findings.unit);
@@ -153,4 +149,9 @@ pub(super) fn families(findings: &Findings<'_>, variant: &Variant) -> Option<Sen
         family(most.family.as_ref())
     );
     Some(numbers.sentence("families", Tone::Note, text, detail))
+}
+
+fn compare_values(a: &PooledFinding, b: &PooledFinding) -> Ordering {
+    let [a, b] = [a, b].map(|finding| finding.strict.difference.value);
+    a.total_cmp(&b)
 }

@@ -1,4 +1,4 @@
-//! Sentences about all models together: noise and enhancers.
+//! Sentences about noise and enhancers, over all models together.
 
 use super::format::format_alone;
 use super::sentence::{Numbers, Sentence, Tone, level_runs, models};
@@ -8,59 +8,61 @@ use darkqa_score::comparisons::{Claim, PooledFinding};
 use darkqa_score::significance::Significance;
 use darkqa_score::subject;
 
-/// Largest number of sentences about one enhancer.
+/// Maximum number of sentences about one enhancer.
 const MAX_PER_ENHANCER: usize = 3;
 
-/// Findings with one verdict, and how sentences speak of them: the level where they are largest, or the mean of levels of which none is
-/// detected alone.
-struct Shown<'f> {
+/// A detected effect that is reported in one sentence: at several levels, or as a mean over levels at none of which it is detected.
+struct DetectedEffect<'f> {
+    /// The finding at the level with the largest effect, or the mean.
     largest: &'f PooledFinding,
-    /// The levels.
+    /// The levels, as `L3–L5`.
     at: String,
-    /// Whether there are several levels.
-    are_several: bool,
+    /// True if the effect is at several levels.
+    has_several_levels: bool,
 }
 
-impl<'f> Shown<'f> {
-    /// The findings of levels with a verdict, if there are any.
+impl<'f> DetectedEffect<'f> {
+    /// The effect at all levels with a verdict; `None` if no level has it.
     fn levels(levels: &[&'f PooledFinding], verdict: Significance) -> Option<Self> {
-        let shown = with_verdict(levels, verdict);
+        let detected = with_verdict(levels, verdict);
         Some(Self {
-            largest: PooledFinding::largest(&shown)?,
-            at: runs(&shown, levels),
-            are_several: shown.len() > 1,
+            largest: PooledFinding::largest(&detected)?,
+            at: runs(&detected, levels),
+            has_several_levels: detected.len() > 1,
         })
     }
 
-    /// The findings of levels with a verdict, and each mean with that verdict of whose levels none has it.
+    /// The effect at all levels with a verdict, and each mean with that verdict if none of its levels has it.
     fn all(
         levels: &[&'f PooledFinding],
         means: &[&'f PooledFinding],
         verdict: Significance,
     ) -> Vec<Self> {
-        let shown = with_verdict(levels, verdict);
-        let is_alone = |mean: &&PooledFinding| {
-            let mut shown = shown.iter();
-            !shown.any(|finding| mean.mean_over.contains(&finding.level))
-        };
+        let detected = with_verdict(levels, verdict);
         let means = with_verdict(means, verdict)
             .into_iter()
-            .filter(is_alone)
+            .filter(|mean| {
+                !detected
+                    .iter()
+                    .any(|finding| mean.mean_over.contains(&finding.level))
+            })
             .map(|mean| Self {
                 largest: mean,
                 at: mean_levels(mean, levels),
-                are_several: true,
+                has_several_levels: true,
             });
-        let levels = Self::levels(levels, verdict);
-        levels.into_iter().chain(means).collect()
+        Self::levels(levels, verdict)
+            .into_iter()
+            .chain(means)
+            .collect()
     }
 
-    /// `up to 5.0 points`, `5.0 points` of one level, or `5.0 points on average`.
+    /// The size in words: `up to 5.0 points`, `5.0 points` for one level, or `5.0 points on average`.
     fn size(&self, numbers: &mut Numbers) -> String {
         let size = numbers.size("effect", self.largest.strict.difference.value);
         if self.is_mean() {
             format!("{size} points on average")
-        } else if self.are_several {
+        } else if self.has_several_levels {
             format!("up to {size} points")
         } else {
             format!("{size} points")
@@ -81,27 +83,30 @@ impl<'f> Shown<'f> {
     }
 }
 
-/// The levels of a mean among all of a set.
+/// The levels of a mean in words, as a part of `levels`.
 pub(super) fn mean_levels(mean: &PooledFinding, levels: &[&PooledFinding]) -> String {
     let all: Vec<AxisLevel> = levels.iter().map(|finding| finding.level).collect();
     level_runs(&mean.mean_over, &all)
 }
 
-/// The levels about which nothing is detected, alone or as a mean.
-fn unshown<'f>(levels: &[&'f PooledFinding], means: &[&PooledFinding]) -> Vec<&'f PooledFinding> {
-    let is_detected = |mean: &&PooledFinding| matches!(mean.claim(), Claim::Detected(_));
-    let means: Vec<&PooledFinding> = means.iter().copied().filter(is_detected).collect();
-    let mut unshown = with_verdict(levels, Significance::NotShown);
-    unshown.retain(|finding| {
-        !means
-            .iter()
-            .any(|mean| mean.mean_over.contains(&finding.level))
-    });
-    unshown
+/// The levels at which nothing is detected, neither alone nor as a part of a mean.
+fn undetected<'f>(
+    levels: &[&'f PooledFinding],
+    means: &[&PooledFinding],
+) -> Vec<&'f PooledFinding> {
+    with_verdict(levels, Significance::NotShown)
+        .into_iter()
+        .filter(|finding| {
+            !means.iter().any(|mean| {
+                matches!(mean.claim(), Claim::Detected(_))
+                    && mean.mean_over.contains(&finding.level)
+            })
+        })
+        .collect()
 }
 
-/// How accuracy with noise differs from that by the exposure drop alone: a sentence for each verdict, at the level where it differs
-/// most, or over several. The two variants differ in contrast, too, so this is no effect of noise alone.
+/// The difference in accuracy between noise and the exposure drop alone: a sentence for each verdict, at the level with the largest
+/// difference, or as a mean over levels. The two variants also differ in contrast, so this is not an effect of noise alone.
 pub(super) fn noise(
     levels: &[&PooledFinding],
     means: &[&PooledFinding],
@@ -112,27 +117,27 @@ pub(super) fn noise(
         (Significance::Worse, "lower"),
         (Significance::Better, "higher"),
     ] {
-        for shown in Shown::all(levels, means, verdict) {
+        for effect in DetectedEffect::all(levels, means, verdict) {
             let mut numbers = Numbers::new(unit);
-            let size = shown
+            let size = effect
                 .size(&mut numbers)
                 .replace(" points", &format!(" points {word}"));
-            let (at, more) = if shown.is_mean() {
-                (shown.at.clone(), shown.place())
+            let (at, more) = if effect.is_mean() {
+                (effect.at.clone(), effect.place())
             } else {
-                let at = shown.largest.level.to_string();
-                (at, format!("; shown at {}", shown.at))
+                let at = effect.largest.level.to_string();
+                (at, format!("; shown at {}", effect.at))
             };
             let text =
                 format!("With noise, accuracy is {size} than by the exposure drop alone ({at}).");
-            let detail = detail(shown.largest, &mut numbers, &more);
+            let detail = detail(effect.largest, &mut numbers, &more);
             sentences.push(numbers.sentence("noise", verdict.into(), text, detail));
         }
     }
     if !sentences.is_empty() {
         return sentences;
     }
-    let Some(largest) = PooledFinding::largest(&unshown(levels, means)) else {
+    let Some(largest) = PooledFinding::largest(&undetected(levels, means)) else {
         return sentences;
     };
     if let Some(format) = format_alone(levels, unit) {
@@ -154,7 +159,7 @@ pub(super) fn noise(
     let more = format!(
         "; largest at {}{}",
         largest.level,
-        reserved(largest, &mut numbers)
+        reservation(largest, &mut numbers)
     );
     let detail = detail(largest, &mut numbers, &more);
     vec![numbers.sentence("noise", Tone::NotShown, text, detail)]
@@ -173,28 +178,32 @@ pub(super) fn enhancers(
             .copied()
             .filter(|mean| mean.enhancer == levels[0].enhancer)
             .collect();
-        let shown = [Significance::Worse, Significance::Better]
+        let detected = [Significance::Worse, Significance::Better]
             .into_iter()
             .flat_map(|verdict| {
-                let shown = Shown::all(levels, &own, verdict).into_iter();
-                shown.filter_map(move |shown| enhancer(&shown, verdict, unit))
+                DetectedEffect::all(levels, &own, verdict)
+                    .into_iter()
+                    .filter_map(move |effect| enhancer(&effect, verdict, unit))
             });
-        let unshown = unshown(levels, &own);
-        let unshown = no_effect(&unshown, levels, unit);
-        sentences.extend(shown.chain(unshown).take(MAX_PER_ENHANCER));
+        let no_effect = no_effect(&undetected(levels, &own), levels, unit);
+        sentences.extend(detected.chain(no_effect).take(MAX_PER_ENHANCER));
     }
     sentences
 }
 
 /// The detected effect of an enhancer.
-fn enhancer(shown: &Shown<'_>, verdict: Significance, unit: ClusterUnit) -> Option<Sentence> {
-    let name = shown.largest.enhancer.as_ref()?;
-    let at = &shown.at;
+fn enhancer(
+    effect: &DetectedEffect<'_>,
+    verdict: Significance,
+    unit: ClusterUnit,
+) -> Option<Sentence> {
+    let name = effect.largest.enhancer.as_ref()?;
+    let at = &effect.at;
     let mut numbers = Numbers::new(unit);
     numbers.about(name);
-    let size = shown.size(&mut numbers);
+    let size = effect.size(&mut numbers);
     let is_better = verdict == Significance::Better;
-    let (text, note) = if is_observer(shown.largest) {
+    let (text, note) = if is_observer(effect.largest) {
         let more = if is_better { "more" } else { "less" };
         (
             format!("With {name} the observer confirms {more} at {at}, by {size}."),
@@ -204,28 +213,28 @@ fn enhancer(shown: &Shown<'_>, verdict: Significance, unit: ClusterUnit) -> Opti
         let verb = if is_better { "helps" } else { "harms" };
         (format!("{name} {verb} at {at}, by {size}."), "")
     };
-    let more = shown.place() + note;
-    let detail = detail(shown.largest, &mut numbers, &more);
+    let more = effect.place() + note;
+    let detail = detail(effect.largest, &mut numbers, &more);
     Some(numbers.sentence("enhancer", verdict.into(), text, detail))
 }
 
-/// The levels at which no effect of an enhancer is detected, among all of its levels.
+/// The sentence about the levels at which no effect of an enhancer is detected, among all of its levels.
 fn no_effect(
-    unshown: &[&PooledFinding],
+    undetected: &[&PooledFinding],
     levels: &[&PooledFinding],
     unit: ClusterUnit,
 ) -> Option<Sentence> {
-    let largest = PooledFinding::largest(unshown)?;
+    let largest = PooledFinding::largest(undetected)?;
     let name = largest.enhancer.as_ref()?;
-    if let Some(format) = format_alone(unshown, unit) {
+    if let Some(format) = format_alone(undetected, unit) {
         return Some(format);
     }
     let mut numbers = Numbers::new(unit);
     numbers.about(name);
-    let at = runs(unshown, levels);
+    let at = runs(undetected, levels);
     let text = if is_unconfirmed(largest) {
         let difference = largest.strict.difference.value;
-        let up_to = if unshown.len() > 1 { "up to " } else { "" };
+        let up_to = if undetected.len() > 1 { "up to " } else { "" };
         let size = numbers.size("effect", difference);
         let word = lower_or_higher(difference);
         format!("{name} at {at}: accuracy {up_to}{size} points {word}{UNCONFIRMED}.")
@@ -235,13 +244,13 @@ fn no_effect(
     let more = format!(
         "; largest at {}{}",
         largest.level,
-        reserved(largest, &mut numbers)
+        reservation(largest, &mut numbers)
     );
     let detail = detail(largest, &mut numbers, &more);
     Some(numbers.sentence("enhancer", Tone::NotShown, text, detail))
 }
 
-/// Whether a finding is about the observer alone. It has its own words: what it does not confirm need not be lost.
+/// True if a finding is about the observer alone, which has its own wording: evidence that it does not confirm may still be present.
 fn is_observer(finding: &PooledFinding) -> bool {
     matches!(&finding.models[..], [one] if subject::is_observer(one))
 }
@@ -254,16 +263,16 @@ pub(super) fn lower_or_higher(difference: f64) -> &'static str {
     if difference < 0.0 { "lower" } else { "higher" }
 }
 
-/// Whether nothing is detected although the interval excludes 0. The text then gives the effect, because "nothing was detected" next to
-/// such an interval reads as a contradiction.
+/// True if nothing is detected although the interval excludes 0. The sentence then reports the effect, because "nothing was detected" next
+/// to such an interval would look contradictory.
 pub(super) fn is_unconfirmed(finding: &PooledFinding) -> bool {
     let difference = finding.strict.difference;
     let excludes_zero = difference.low > 0.0 || difference.high < 0.0;
     excludes_zero && matches!(finding.claim(), Claim::Open | Claim::InOwnSet)
 }
 
-/// Why a finding is not among those detected although its own test or its interval detects it; empty otherwise.
-pub(super) fn reserved(finding: &PooledFinding, numbers: &mut Numbers) -> String {
+/// The reason why a finding does not count as detected, although its own test or its interval detects it; empty for other findings.
+pub(super) fn reservation(finding: &PooledFinding, numbers: &mut Numbers) -> String {
     let strict = &finding.strict;
     let difference = strict.difference;
     match finding.claim() {
@@ -281,21 +290,24 @@ pub(super) fn reserved(finding: &PooledFinding, numbers: &mut Numbers) -> String
     }
 }
 
-/// The findings with a verdict in both parsings and after the correction over all sentences; those without one are
-/// [`Significance::NotShown`].
+/// The findings with a verdict in both parsings and after the correction over all sentences. A finding that could have a verdict but has
+/// none counts as [`Significance::NotShown`].
 pub(super) fn with_verdict<'f>(
     levels: &[&'f PooledFinding],
     verdict: Significance,
 ) -> Vec<&'f PooledFinding> {
-    let has = |finding: &&PooledFinding| match finding.claim() {
-        Claim::Detected(found) => found == verdict,
-        Claim::Impossible => false,
-        _ => verdict == Significance::NotShown,
-    };
-    levels.iter().copied().filter(has).collect()
+    levels
+        .iter()
+        .copied()
+        .filter(|finding| match finding.claim() {
+            Claim::Detected(found) => found == verdict,
+            Claim::Impossible => false,
+            _ => verdict == Significance::NotShown,
+        })
+        .collect()
 }
 
-/// The levels of some findings among all of a set.
+/// The levels of `some` findings in words, as a part of those of `all`.
 pub(super) fn runs(some: &[&PooledFinding], all: &[&PooledFinding]) -> String {
     let [some, all] = [some, all].map(|findings| {
         findings

@@ -4,20 +4,14 @@ use super::sentence::{Numbers, Sentence, Tone};
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::{FindingByReading, NoiseHypothesis, Robustness};
 
-/// How many findings about noise hold under which readings; `None` with one reading. The levels of one finding count once.
+/// The numbers of findings about noise that hold under all, some or none of the noise profiles; `None` without findings. Findings that are
+/// repeated by level count once.
 pub(super) fn readings(found: &[FindingByReading], unit: ClusterUnit) -> Option<Sentence> {
     let readings = found.first()?.effects.len();
     let whole: Vec<&FindingByReading> = found
         .iter()
         .filter(|one| !matches!(one.claim, NoiseHypothesis::NoiseCompounds(Some(_))))
         .collect();
-    let of = |robustness: Robustness| {
-        whole
-            .iter()
-            .by_ref()
-            .filter(|one| one.robustness == robustness)
-            .count()
-    };
     let [all, some, reversed, none, open] = [
         Robustness::All,
         Robustness::Some,
@@ -25,7 +19,12 @@ pub(super) fn readings(found: &[FindingByReading], unit: ClusterUnit) -> Option<
         Robustness::None,
         Robustness::Open,
     ]
-    .map(of);
+    .map(|robustness| {
+        whole
+            .iter()
+            .filter(|one| one.robustness == robustness)
+            .count()
+    });
     let mut numbers = Numbers::new(unit);
     let text = format!(
         "{} of {} findings about noise {} under all {} noise profiles.",

@@ -1,4 +1,4 @@
-//! Sentences about photographs in the dark: what they cost, whether synthetic images stand for them, and what an enhancer does to them.
+//! Sentences about photographs in the dark: their cost, their difference from synthetic images, and the effect of enhancers.
 
 use super::sentence::{Numbers, Sentence, Tone};
 use crate::text::words::light;
@@ -9,7 +9,8 @@ use darkqa_score::photographs::pair_darkness::PairDarkness;
 use darkqa_score::significance::Significance;
 use darkqa_score::subject::models_under_test;
 
-/// Sentences about each model and each photograph: against the light, against synthetic images that are as dark, and enhanced.
+/// Sentences about each model and each photograph: compared with the lit frame, with synthetic images of the same darkness, and with the
+/// enhanced photograph.
 pub(super) fn real(findings: &Findings<'_>) -> Vec<Sentence> {
     let models = models_under_test(findings.grid.subjects.iter().map(|subject| &*subject.model));
     let mut sentences = Vec::new();
@@ -23,16 +24,26 @@ pub(super) fn real(findings: &Findings<'_>) -> Vec<Sentence> {
                     && models.contains(&*row.first.model)
             })
             .collect();
-        let of = |kind: ComparisonKind| rows.iter().copied().filter(move |row| row.kind == kind);
-        sentences.extend(of(ComparisonKind::Level).map(|row| cost(row, pair, findings.unit)));
-        let raw = of(ComparisonKind::RealSynthetic).filter(|row| row.first.enhancer.is_none());
-        sentences.extend(raw.map(|row| against_synthetic(row, findings.unit)));
-        sentences.extend(of(ComparisonKind::RealEnhanced).map(|row| enhanced(row, findings.unit)));
+        let unit = findings.unit;
+        for row in rows.iter().filter(|row| row.kind == ComparisonKind::Level) {
+            sentences.push(cost(row, pair, unit));
+        }
+        for row in &rows {
+            if row.kind == ComparisonKind::RealSynthetic && row.first.enhancer.is_none() {
+                sentences.push(against_synthetic(row, unit));
+            }
+        }
+        for row in rows
+            .iter()
+            .filter(|row| row.kind == ComparisonKind::RealEnhanced)
+        {
+            sentences.push(enhanced(row, unit));
+        }
     }
     sentences
 }
 
-/// The cost of the dark for a model in photographs.
+/// The loss of a model on photographs in the dark.
 fn cost(row: &Comparison, pair: &PairDarkness, unit: ClusterUnit) -> Sentence {
     let mut numbers = Numbers::new(unit);
     let least = if pair.is_lower_bound { "≥ " } else { "" };
@@ -54,7 +65,7 @@ fn cost(row: &Comparison, pair: &PairDarkness, unit: ClusterUnit) -> Sentence {
     sentence("real darkness", row, numbers, text)
 }
 
-/// Whether synthetic images stand for photographs.
+/// The difference of a model between photographs and synthetic images of the same darkness.
 fn against_synthetic(row: &Comparison, unit: ClusterUnit) -> Sentence {
     let mut numbers = Numbers::new(unit);
     let (model, synthetic) = (&row.first.model, light(&row.second.variant, None));

@@ -1,4 +1,4 @@
-//! Sentences about the sample: what so few clusters cannot show, and which models are left out.
+//! Sentences about the sample: findings without a possible verdict, wide intervals, and models that are left out.
 
 use super::sentence::{Numbers, Sentence, Tone, level_runs};
 use crate::text::words::light;
@@ -7,10 +7,10 @@ use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::{ModelsLeftOut, PooledFinding, PooledKind};
 use darkqa_score::findings::Findings;
 
-/// Half-width of an interval in points above which the sample is called small.
+/// Half-width of an interval above which the sample is called small, as a share (0.05 is 5 points); chosen.
 pub(super) const WIDE: f64 = 0.05;
 
-/// Largest number of models that a sentence names.
+/// Maximum number of models that a sentence names.
 const MAX_NAMED: usize = 3;
 
 /// The subject of findings of a kind.
@@ -22,14 +22,14 @@ fn topic(kind: PooledKind, variant: &Variant, enhancer: Option<&EnhancerName>) -
     }
 }
 
-/// Whether no finding of a set can have a verdict, because the clusters are too few for any corrected p-value.
+/// True if no finding of a set can have a verdict, because there are too few clusters for a small corrected p-value.
 pub(super) fn is_impossible(set: &[&PooledFinding]) -> bool {
     set.iter()
         .all(|finding| !finding.strict.verdict.is_possible())
 }
 
-/// On what no verdict is possible with so few clusters; `None` if one is possible on everything. A set of which another light has
-/// verdicts is named with its light.
+/// The topics without a possible verdict because of too few clusters; `None` if every topic can have one. If the same topic can have a
+/// verdict with another variant, the sentence names the variant.
 pub(super) fn impossible(findings: &Findings<'_>) -> Option<Sentence> {
     let last = findings
         .grid
@@ -40,11 +40,8 @@ pub(super) fn impossible(findings: &Findings<'_>) -> Option<Sentence> {
         .iter()
         .filter(|finding| finding.family.is_none())
         .collect();
-    let is_one_set = |a: &&PooledFinding, b: &&PooledFinding| {
-        (a.kind, &a.variant, &a.enhancer) == (b.kind, &b.variant, &b.enhancer)
-    };
     let (without, with): (Vec<_>, Vec<_>) = whole
-        .chunk_by(is_one_set)
+        .chunk_by(|a, b| (a.kind, &a.variant, &a.enhancer) == (b.kind, &b.variant, &b.enhancer))
         .partition(|set| is_impossible(set));
     let (mut topics, mut least) = (Vec::<String>::new(), Vec::new());
     for set in without {
@@ -53,11 +50,11 @@ pub(super) fn impossible(findings: &Findings<'_>) -> Option<Sentence> {
             continue;
         }
         let mut topic = topic(first.kind, &first.variant, first.enhancer.as_ref());
-        let is_same = |other: &PooledFinding| {
-            (other.kind, &other.enhancer) == (first.kind, &first.enhancer)
-                && other.variant.kind.is_some()
-        };
-        if with.iter().any(|other| is_same(other[0])) {
+        let is_possible_elsewhere = with.iter().any(|other| {
+            (other[0].kind, &other[0].enhancer) == (first.kind, &first.enhancer)
+                && other[0].variant.kind.is_some()
+        });
+        if is_possible_elsewhere {
             topic = format!("{topic} {}", light(&first.variant, None));
         }
         if !topics.contains(&topic) {
@@ -84,8 +81,8 @@ pub(super) fn impossible(findings: &Findings<'_>) -> Option<Sentence> {
     Some(numbers.sentence("no verdict", Tone::Note, text, detail))
 }
 
-/// How wide the intervals are, if the widest is wide: from the narrowest to the widest. This is no power: what so small a sample
-/// would show of a true effect depends on more than the intervals.
+/// The half-widths of the narrowest and the widest interval, if the widest exceeds [`WIDE`]. This is not the power of the tests, which
+/// depends on more than the intervals.
 pub(super) fn power(all: &[PooledFinding], unit: ClusterUnit) -> Option<Sentence> {
     let whole = all.iter().filter(|finding| finding.family.is_none());
     let which = if whole
@@ -97,21 +94,16 @@ pub(super) fn power(all: &[PooledFinding], unit: ClusterUnit) -> Option<Sentence
         "the findings that may have a verdict"
     };
     let whole = whole.filter(|finding| finding.strict.verdict.is_possible());
-    let half = |finding: &PooledFinding| {
-        (finding.strict.difference.high - finding.strict.difference.low) / 2.0
-    };
-    let by_width = |a: &&PooledFinding, b: &&PooledFinding| half(a).total_cmp(&half(b));
-    let narrowest = half(whole.clone().min_by(by_width)?);
-    let widest = whole.max_by(by_width)?;
-    if half(widest) <= WIDE {
+    let narrowest = whole
+        .clone()
+        .min_by(|a, b| half_width(a).total_cmp(&half_width(b)))?;
+    let widest = whole.max_by(|a, b| half_width(a).total_cmp(&half_width(b)))?;
+    if half_width(widest) <= WIDE {
         return None;
     }
     let mut numbers = Numbers::new(unit);
-    let mut points = |name, half: f64| numbers.number(name, 100.0 * half, 0);
-    let [least, most] = [
-        points("narrowest", narrowest),
-        points("widest", half(widest)),
-    ];
+    let [least, most] = [("narrowest", narrowest), ("widest", widest)]
+        .map(|(name, finding)| numbers.number(name, 100.0 * half_width(finding), 0));
     let range = if least == most {
         most
     } else {
@@ -125,8 +117,13 @@ pub(super) fn power(all: &[PooledFinding], unit: ClusterUnit) -> Option<Sentence
     Some(numbers.sentence("power", Tone::Note, text, detail.to_owned()))
 }
 
-/// The models that are left out of findings, because they answered less than others: a sentence for the same levels and models. False
-/// answers are left out at the levels of darkness.
+/// Half the width of a finding's interval, as a share.
+fn half_width(finding: &PooledFinding) -> f64 {
+    (finding.strict.difference.high - finding.strict.difference.low) / 2.0
+}
+
+/// The models that are left out of findings, because they answered fewer questions than others. Findings with the same levels and
+/// models share a sentence. False answers are skipped, because they leave out the same models as the cost of darkness.
 pub(crate) fn left_out(findings: &Findings<'_>) -> Vec<Sentence> {
     let mut grouped: Vec<(&ModelsLeftOut, Vec<String>)> = Vec::new();
     for set in &findings.left_out {
@@ -138,10 +135,10 @@ pub(crate) fn left_out(findings: &Findings<'_>) -> Vec<Sentence> {
             topic(set.kind, &set.variant, set.enhancer.as_ref()),
             light(&set.variant, None)
         );
-        let is_same = |other: &ModelsLeftOut| {
+        let same = grouped.iter_mut().find(|(other, _)| {
             runs(other) == runs(set) && other.models == set.models && other.items == set.items
-        };
-        match grouped.iter_mut().find(|(other, _)| is_same(other)) {
+        });
+        match same {
             Some((_, topics)) => topics.push(about),
             None => grouped.push((set, vec![about])),
         }
@@ -187,12 +184,12 @@ pub(crate) fn left_out(findings: &Findings<'_>) -> Vec<Sentence> {
         .collect()
 }
 
-/// The levels at which models answered less.
+/// The levels at which the models answered fewer questions, in words.
 fn runs(set: &ModelsLeftOut) -> String {
     level_runs(&set.levels, &set.asked)
 }
 
-/// Things in words, as `a, b and c`.
+/// A list in words, as `a, b and c`.
 pub(super) fn listed(things: &[String]) -> String {
     match things {
         [] => String::new(),

@@ -35,15 +35,15 @@ pub(crate) fn self_agreement(found: &SelfAgreement<'_>) -> Vec<Sentence> {
         for enhancer in enhancers(found, model) {
             sentences.extend(enhanced(found, model, &Variant::NONE, &enhancer));
         }
-        sentences.extend(way_out(found, model));
+        sentences.extend(cannot_tell_shares(found, model));
     }
     for sentence in &mut sentences {
-        sentence.name_training(&found.grid.listing);
+        sentence.add_training_data(&found.grid.listing);
     }
     sentences
 }
 
-/// The sentence in place of a verdict: no reply at L0 could be read.
+/// The sentence for a model without a readable reply at L0.
 fn unread(found: &SelfAgreement<'_>, model: &str) -> Sentence {
     let text = format!(
         "Nothing is known about {model}: no answer could be read in any of its replies at L0, so that there is nothing to compare it with."
@@ -58,7 +58,7 @@ fn unread(found: &SelfAgreement<'_>, model: &str) -> Sentence {
     )
 }
 
-/// The sentence in place of a verdict: all questions have one answer about nearly all images.
+/// The sentence for a model whose answer to each question is the same for nearly all images, so that no verdict is possible.
 fn cannot_tell(found: &SelfAgreement<'_>, model: &str) -> Sentence {
     let mut numbers = Numbers::new(found.unit);
     let (_, all) = found.informative(model);
@@ -69,8 +69,8 @@ fn cannot_tell(found: &SelfAgreement<'_>, model: &str) -> Sentence {
     let images = found
         .questions
         .iter()
-        .filter(|question| question.model == model);
-    let images = images.map(|question| question.images);
+        .filter(|question| question.model == model)
+        .map(|question| question.images);
     let (least, greatest) = (images.clone().min(), images.max());
     let fewest = numbers.count("fewest_images", least.unwrap_or_default());
     let most = numbers.count("most_images", greatest.unwrap_or_default());
@@ -86,12 +86,13 @@ fn cannot_tell(found: &SelfAgreement<'_>, model: &str) -> Sentence {
     numbers.sentence("bank_cannot_tell", Tone::Note, text, detail)
 }
 
-/// Each pair of models at L0.
+/// The agreement of each pair of models at L0.
 fn between(found: &SelfAgreement<'_>) -> Vec<Sentence> {
     let models = models_under_test(found.models());
-    let pairs = found.between.iter();
-    let pairs =
-        pairs.filter(|pair| models.contains(&*pair.first) && models.contains(&*pair.second));
+    let pairs = found
+        .between
+        .iter()
+        .filter(|pair| models.contains(&*pair.first) && models.contains(&*pair.second));
     pairs.map(|pair| {
         let mut numbers = Numbers::new(found.unit);
         let same = numbers.percent("same", pair.same.value);
@@ -147,11 +148,9 @@ fn compared<'f>(
 /// The agreement of a model's answers at the darkest level of a variant.
 fn darkness(found: &SelfAgreement<'_>, model: &str, variant: &Variant) -> Option<Sentence> {
     let mut cells = found.whole().filter(|cell| cell.subject.model == model);
-    let raw =
-        |cell: &&AgreementCell| cell.subject.variant == *variant && cell.subject.enhancer.is_none();
     let dark = cells
         .clone()
-        .filter(raw)
+        .filter(|cell| cell.subject.variant == *variant && cell.subject.enhancer.is_none())
         .max_by_key(|cell| cell.subject.level)?;
     let level = dark.subject.level?;
     let agreement = dark.agreement?;
@@ -159,25 +158,25 @@ fn darkness(found: &SelfAgreement<'_>, model: &str, variant: &Variant) -> Option
     let share = numbers.percent("agreement", agreement.value);
     let ceiling = cells.clone().find(|cell| cell.role() == CellRole::Ceiling);
     let floor = cells.find(|cell| cell.role() == CellRole::Floor);
-    let mut beside = Vec::new();
+    let mut references = Vec::new();
     for (name, words, cell) in [
         ("ceiling", "asked again at L0", ceiling),
         ("floor", "without an image", floor),
     ] {
         if let Some(share) = cell.and_then(|cell| cell.agreement) {
-            beside.push(format!(
+            references.push(format!(
                 "{words} to {} %",
                 numbers.percent(name, share.value)
             ));
         }
     }
-    let beside = if beside.is_empty() {
+    let references = if references.is_empty() {
         String::new()
     } else {
-        format!("; {}", beside.join(", "))
+        format!("; {}", references.join(", "))
     };
     let text = format!(
-        "At {level} ({}) {model} gives its answer at L0 to {share} % of the questions{beside}.",
+        "At {level} ({}) {model} gives its answer at L0 to {share} % of the questions{references}.",
         light(variant, None)
     );
     let test = compared(found, ComparisonKind::Level, model)
@@ -187,7 +186,7 @@ fn darkness(found: &SelfAgreement<'_>, model: &str, variant: &Variant) -> Option
     Some(numbers.sentence("agreement_in_the_dark", tone, text, detail))
 }
 
-/// The detail beside the agreement at the darkest level.
+/// The detail of the sentence about the agreement at the darkest level.
 fn darkness_detail(
     found: &SelfAgreement<'_>,
     dark: &AgreementCell,
@@ -247,38 +246,36 @@ fn darkness_detail(
     parts.join(", ")
 }
 
-/// The effect of an enhancer on a model's agreement, over the levels of a variant; at L0 if there is none.
+/// The effect of an enhancer on a model's agreement with its answers at L0, over the levels of a variant.
 fn enhanced(
     found: &SelfAgreement<'_>,
     model: &str,
     variant: &Variant,
     enhancer: &EnhancerName,
 ) -> Option<Sentence> {
-    let all = compared(found, ComparisonKind::Enhancer, model);
-    let own: Vec<&Comparison> = all
+    let own: Vec<&Comparison> = compared(found, ComparisonKind::Enhancer, model)
         .filter(|comparison| {
             let subject = &comparison.first;
             subject.variant == *variant && subject.enhancer.as_ref() == Some(enhancer)
         })
         .collect();
     let levels: Vec<AxisLevel> = own.iter().filter_map(|c| c.first.level).collect();
-    let at = |significance: Significance| {
-        let shown: Vec<AxisLevel> = own
+    let [better, worse] = [Significance::Better, Significance::Worse].map(|significance| {
+        let detected: Vec<AxisLevel> = own
             .iter()
             .filter(|c| c.claim() == Claim::Detected(significance))
             .filter_map(|c| c.first.level)
             .collect();
-        (!shown.is_empty()).then(|| level_runs(&shown, &levels))
-    };
+        (!detected.is_empty()).then(|| level_runs(&detected, &levels))
+    });
     let strongest = own.iter().max_by(|one, other| {
-        let size = |c: &Comparison| c.strict.paired.difference.value.abs();
-        size(one).total_cmp(&size(other))
+        let [one, other] = [one, other].map(|c| c.strict.paired.difference.value.abs());
+        one.total_cmp(&other)
     })?;
-    let levels = (at(Significance::Better), at(Significance::Worse));
     let (tone, text) = if found.set.light == SetLight::Dark && *variant == Variant::NONE {
         photograph_effects(enhancer, model, strongest.claim())
     } else {
-        level_effects(enhancer, model, &light(variant, None), levels)
+        level_effects(enhancer, model, &light(variant, None), better, worse)
     };
     let mut numbers = Numbers::new(found.unit);
     numbers.about(enhancer);
@@ -298,18 +295,19 @@ fn enhanced(
     Some(numbers.sentence("agreement_enhanced", tone, capitalised(&text), detail))
 }
 
-/// The effect of an enhancer of images in the light of `of` on the answers of a model, with the levels at which it makes them more and less
-/// like those at L0.
+/// The effect of an enhancer on the answers of a model to images of a variant; `better` and `worse` are the levels at which the answers
+/// become more and less like those at L0.
 fn level_effects(
     enhancer: &EnhancerName,
     model: &str,
-    of: &str,
-    levels: (Option<String>, Option<String>),
+    variant: &str,
+    better: Option<String>,
+    worse: Option<String>,
 ) -> (Tone, String) {
-    match levels {
+    match (better, worse) {
         (Some(levels), None) => (
             Tone::Better,
-            format!("{enhancer} brings answers of {model} back at {levels} ({of})."),
+            format!("{enhancer} brings answers of {model} back at {levels} ({variant})."),
         ),
         (None, Some(levels)) if levels == "L0" => (
             Tone::Worse,
@@ -319,23 +317,25 @@ fn level_effects(
         ),
         (None, Some(levels)) => (
             Tone::Worse,
-            format!("{enhancer} takes {model} further from its answers at L0 at {levels} ({of})."),
+            format!(
+                "{enhancer} takes {model} further from its answers at L0 at {levels} ({variant})."
+            ),
         ),
         (Some(better), Some(worse)) => (
             Tone::Note,
             format!(
-                "{enhancer} brings answers of {model} back at {better}, and changes others at {worse} ({of})."
+                "{enhancer} brings answers of {model} back at {better}, and changes others at {worse} ({variant})."
             ),
         ),
         (None, None) => (
             Tone::NotShown,
-            format!("No effect of {enhancer} on answers of {model} was detected ({of})."),
+            format!("No effect of {enhancer} on answers of {model} was detected ({variant})."),
         ),
     }
 }
 
-/// The effect of an enhancer of photographs in the dark on the answers of a model. The answers at L0 were given in the dark themselves, so
-/// that a change is neither help nor harm.
+/// The effect of an enhancer on the answers of a model to photographs in the dark. L0 is also dark here, so a change of an answer is
+/// neither help nor harm.
 fn photograph_effects(enhancer: &EnhancerName, model: &str, change: Claim) -> (Tone, String) {
     match change {
         Claim::Detected(Significance::Worse) => (
@@ -359,8 +359,8 @@ fn photograph_effects(enhancer: &EnhancerName, model: &str, change: Claim) -> (T
     }
 }
 
-/// How often a model states that it cannot tell, where it may.
-fn way_out(found: &SelfAgreement<'_>, model: &str) -> Option<Sentence> {
+/// The share of "cannot tell" replies at L0 and at the darkest level, if the questions offer that choice.
+fn cannot_tell_shares(found: &SelfAgreement<'_>, model: &str) -> Option<Sentence> {
     let light = found
         .light_of(model)
         .filter(|light| light.offers_cannot_tell)?;

@@ -23,16 +23,16 @@ pub(crate) struct Sentence {
     pub text: String,
     /// Effect, interval, p and n.
     pub detail: String,
-    /// Every number of both, by name, as it is written there.
+    /// Every number in text and detail, by name, rounded as it is written there.
     pub values: BTreeMap<String, f64>,
-    /// Tells the sentence from others of its kind.
+    /// Distinguishes the sentence from others of its kind.
     #[serde(skip)]
     pub scope: Scope,
 }
 
 impl Sentence {
     /// Adds the training data of the enhancer to the text, if they are known.
-    pub(super) fn name_training(&mut self, listing: &ModelListing) {
+    pub(super) fn add_training_data(&mut self, listing: &ModelListing) {
         let enhancer = self.scope.subject.as_deref();
         if let Some(training) = enhancer.and_then(|enhancer| listing.training(enhancer)) {
             self.scope.training = format!(" ({training})");
@@ -52,7 +52,7 @@ impl Sentence {
 pub(crate) struct Scope {
     /// The light, if there are several sentences with the same content about different lights.
     pub light: Option<String>,
-    /// The enhancer.
+    /// The enhancer that the sentence is about.
     pub subject: Option<String>,
     /// The level, or the levels, of the difference.
     pub at: Option<String>,
@@ -63,13 +63,13 @@ pub(crate) struct Scope {
 /// The direction of a sentence's effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub(crate) enum Tone {
-    /// An improvement is shown.
+    /// An improvement is detected.
     #[serde(rename = "better")]
     Better,
-    /// A loss is shown.
+    /// A loss is detected.
     #[serde(rename = "worse")]
     Worse,
-    /// Nothing is shown.
+    /// Nothing is detected.
     #[serde(rename = "not shown")]
     NotShown,
     /// The sentence reports no test.
@@ -88,12 +88,12 @@ impl Tone {
         }
     }
 
-    /// Whether a gain or a loss is detected.
+    /// True if a gain or a loss is detected.
     pub(crate) fn is_detected(self) -> bool {
         matches!(self, Self::Better | Self::Worse)
     }
 
-    /// The word of the verdict, for style sheets.
+    /// The CSS class.
     pub(crate) fn class(self) -> &'static str {
         match self {
             Self::Better => "better",
@@ -122,7 +122,7 @@ impl From<Significance> for Tone {
     }
 }
 
-/// The numbers of a sentence. Each method returns a number as text, and notes it under a name.
+/// Builder of a [`Sentence`]: each method returns a number as text and records its value under a name.
 #[derive(Debug)]
 pub(super) struct Numbers {
     values: BTreeMap<String, f64>,
@@ -131,7 +131,7 @@ pub(super) struct Numbers {
 }
 
 impl Numbers {
-    /// No numbers yet; clusters are of this unit.
+    /// An empty builder; `unit` names the clusters.
     pub(super) fn new(unit: ClusterUnit) -> Self {
         Self {
             values: BTreeMap::new(),
@@ -140,12 +140,12 @@ impl Numbers {
         }
     }
 
-    /// Notes the level, or the levels, of the difference.
+    /// Sets the level, or the levels, of the difference.
     pub(super) fn at(&mut self, levels: &impl ToString) {
         self.scope.at = Some(levels.to_string());
     }
 
-    /// Notes the enhancer that the sentence is about.
+    /// Sets the enhancer that the sentence is about.
     pub(super) fn about(&mut self, enhancer: &EnhancerName) {
         self.scope.subject = Some(enhancer.to_string());
     }
@@ -168,21 +168,22 @@ impl Numbers {
         }
     }
 
-    fn note(&mut self, name: &str, value: f64, decimals: i32) {
+    /// Records a value, rounded to a number of decimals.
+    fn record(&mut self, name: &str, value: f64, decimals: i32) {
         let scale = 10_f64.powi(decimals);
         self.values
             .insert(name.to_owned(), (value * scale).round() / scale);
     }
 
-    /// A number of things.
+    /// A count, with thousands separators.
     pub(super) fn count(&mut self, name: &str, count: usize) -> String {
-        self.note(name, count as f64, 0);
-        grouped(count)
+        self.record(name, count as f64, 0);
+        with_separators(count)
     }
 
     /// A plain number.
     pub(super) fn number(&mut self, name: &str, value: f64, decimals: u8) -> String {
-        self.note(name, value, i32::from(decimals));
+        self.record(name, value, i32::from(decimals));
         format!("{value:.*}", usize::from(decimals)).replace('-', "−")
     }
 
@@ -198,7 +199,7 @@ impl Numbers {
 
     /// A difference in points with its sign, as `−4.8`.
     pub(super) fn points(&mut self, name: &str, difference: f64) -> String {
-        self.note(name, 100.0 * difference, 1);
+        self.record(name, 100.0 * difference, 1);
         points(difference)
     }
 
@@ -217,11 +218,11 @@ impl Numbers {
     /// A p-value, as `p = 0.036` or `p < 0.001`.
     pub(super) fn p(&mut self, name: &str, value: f64) -> String {
         if value < 0.001 {
-            self.note(name, 0.001, 3);
+            self.record(name, 0.001, 3);
             "p < 0.001".to_owned()
         } else {
             let text = p(value);
-            // As it is written: halves are not rounded the same way everywhere.
+            // Parsed from the text, because formatting and `round` treat halves differently.
             self.values
                 .insert(name.to_owned(), text.parse().unwrap_or(value));
             format!("p = {text}")
@@ -234,7 +235,7 @@ impl Numbers {
         counted(count, &self.unit.to_string())
     }
 
-    /// The number of questions and clusters of a finding, with the omissions.
+    /// The numbers of questions and clusters of a finding, with the questions left out and an approximate p-value's method.
     pub(super) fn sample(&mut self, finding: &PooledFinding) -> String {
         let items = self.count("n", finding.items);
         let mut parts = vec![format!(
@@ -242,7 +243,7 @@ impl Numbers {
             self.clusters(finding.clusters)
         )];
         let all = finding.items + finding.dropped;
-        // Above 5 % the reader should know that the items are not those of the tables.
+        // Above 5 % the reader should know that the tables include more questions.
         if 20 * finding.dropped > all {
             let dropped = self.count("dropped", finding.dropped);
             parts.push(format!("{dropped} left out because a model has no reply"));
@@ -259,8 +260,8 @@ impl Numbers {
     }
 }
 
-/// A whole number with its thousands apart, as `26,781`.
-fn grouped(number: usize) -> String {
+/// A whole number with thousands separators, as `26,781`.
+fn with_separators(number: usize) -> String {
     let digits = number.to_string();
     let mut text = String::new();
     for (place, digit) in digits.chars().enumerate() {
@@ -272,7 +273,7 @@ fn grouped(number: usize) -> String {
     text
 }
 
-/// Models in words: the name of one, or how many there are.
+/// Models in words: the name of a single model, or their number.
 pub(super) fn models(names: &[String], numbers: &mut Numbers) -> String {
     match names {
         [one] => one.clone(),
@@ -283,7 +284,7 @@ pub(super) fn models(names: &[String], numbers: &mut Numbers) -> String {
     }
 }
 
-/// A text with its first letter as a capital.
+/// A text with its first letter in upper case.
 pub(crate) fn capitalised(text: &str) -> String {
     let mut letters = text.chars();
     letters
@@ -294,15 +295,18 @@ pub(crate) fn capitalised(text: &str) -> String {
         .collect()
 }
 
-/// Levels that follow each other in `all` joined by a dash, as `L1–L3, L5`.
+/// Levels in words; levels that are neighbours in `all` become a range, as `L1–L3, L5`.
 pub(super) fn level_runs<T: PartialEq + ToString>(levels: &[T], all: &[T]) -> String {
-    let place = |level: &T| all.iter().position(|other| other == level);
-    let runs = levels.chunk_by(|a, b| place(a).map(|place| place + 1) == place(b));
-    runs.map(|run| match run {
-        [one] => one.to_string(),
-        [first, .., last] => format!("{}–{}", first.to_string(), last.to_string()),
-        [] => String::new(),
-    })
-    .collect::<Vec<_>>()
-    .join(", ")
+    let runs: Vec<String> = levels
+        .chunk_by(|a, b| {
+            let [a, b] = [a, b].map(|level| all.iter().position(|other| other == level));
+            a.map(|a| a + 1) == b
+        })
+        .map(|run| match run {
+            [one] => one.to_string(),
+            [first, .., last] => format!("{}–{}", first.to_string(), last.to_string()),
+            [] => String::new(),
+        })
+        .collect();
+    runs.join(", ")
 }

@@ -1,6 +1,6 @@
 //! Table of new runs compared with an old run, with a row for each model and condition.
 
-use crate::text::latex::escaped;
+use crate::text::latex::escape;
 use crate::text::table::ColumnKind::{self, Count, Number, P, Percent, Points, Text};
 use crate::text::table::{Table, TableBuilder, TableCell};
 use darkqa_score::comparisons::{BaselineRow, BaselineSide, MIN_PAIRS};
@@ -59,7 +59,7 @@ pub(crate) fn baseline(rows: &[BaselineRow], old: &str) -> Table {
     table.heading = Some(format!("New less {old}, paired by question and image"));
     table.latex = Some(format!(
         "New less {}, paired by question, in percentage points.",
-        escaped(old)
+        escape(old)
     ));
     let too_few = rows
         .iter()

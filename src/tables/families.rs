@@ -1,7 +1,7 @@
 //! Table of accuracy by family, with a row for each model in a condition. An accuracy is marked if it is detected to be below that of a
 //! model without images.
 
-use crate::text::latex::escaped;
+use crate::text::latex::escape;
 use crate::text::table::ColumnKind::{Percent, Text};
 use crate::text::table::{ColumnHeads, Table, TableBuilder, TableCell};
 use crate::text::words::family as family_name;
@@ -27,7 +27,7 @@ pub(super) fn families(findings: &Findings<'_>) -> Table {
         let name = family_name(family);
         let names = ColumnHeads {
             page: Some(name.to_owned()),
-            latex: family.map(|_| escaped(name)),
+            latex: family.map(|_| escape(name)),
             ..ColumnHeads::default()
         };
         builder = builder.column(Percent, names, |subject| {

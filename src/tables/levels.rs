@@ -30,7 +30,7 @@ pub(super) fn levels(findings: &Findings<'_>) -> Vec<Table> {
 /// One table for each axis. `items` is a caption text about the items; empty for all items.
 fn summary_tables(findings: &Findings<'_>, summary: &AccuracySummary, items: &str) -> Vec<Table> {
     let strict = summary.family_cells(None, ReadingMode::Strict);
-    let ladder = Ladder::new(strict.map(|cell| (&cell.subject, cell))).in_light_of(findings);
+    let ladder = Ladder::new(strict.map(|cell| (&cell.subject, cell))).with_pairs(findings);
     let notes = notes(summary, &ladder);
     let mut tables: Vec<Table> = ladder
         .by_axis()

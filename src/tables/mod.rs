@@ -123,7 +123,7 @@ impl<T> TableBuilder<T> {
         for column in listing.columns() {
             let head = format!("csv {}", column.word());
             self = self.column(Text, &*head, |row| {
-                let fact = listing.fact(*column, &subject(row).model);
+                let fact = listing.cell(*column, &subject(row).model);
                 TableCell::from(
                     Some(fact)
                         .filter(|fact| !fact.is_empty())

@@ -164,7 +164,8 @@ fn notes(curves: &[&Curve]) -> Vec<String> {
     let needs_data = curves
         .clone()
         .any(|curve| matches!(curve.summary.threshold, Err(NoThreshold::Thin(_))));
-    let requirement = needs_data.then(|| format!("a threshold needs {}", SparseLevel::needed()));
+    let requirement =
+        needs_data.then(|| format!("a threshold needs {}", SparseLevel::requirement()));
     let left_out = curves
         .filter(|curve| !curve.summary.left_out.is_empty())
         .map(|curve| {

@@ -3,7 +3,7 @@
 use crate::text::terminal::line;
 use serde::Serialize;
 
-/// Share of unreadable replies of a model above which an alert names it; chosen.
+/// Share of unreadable replies above which an alert names the model; chosen.
 pub(crate) const MAX_UNREAD: f64 = 0.02;
 
 /// One line above a report.
@@ -29,7 +29,7 @@ impl Alert {
 pub enum AlertKind {
     /// Replies that do not depend on the image.
     ImageIgnored,
-    /// A run that is named again, or that adds no reply to those of the others.
+    /// A run that is named twice, or that adds no reply to the other runs.
     Runs,
     /// A run in which trials have no reply yet.
     NotComplete,
@@ -37,43 +37,43 @@ pub enum AlertKind {
     Failed,
     /// Requests that cost more than their limit.
     Cost,
-    /// Replies in which no answer can be read, above 2 %.
+    /// More than 2 % of replies without a readable answer.
     Unread,
-    /// Answers of people that are no choice of their question.
+    /// Answers of people that are not a choice of the question.
     NoChoice,
-    /// Replies that the lenient parsing of this version reads differently.
+    /// Replies whose lenient parsing differs in this version.
     Reading,
     /// Fewer clusters than an interval needs.
     Clusters,
     /// Models that did not answer the same questions.
     Items,
-    /// Other questions, other words of one question, or other orders of its choices.
+    /// Different questions, wording of a question, or order of choices.
     Questions,
-    /// Other data, or other files under the same names.
+    /// Different data, or different files with the same names.
     Data,
-    /// Other images by the seed, the noise model, an enhancer or the program.
+    /// Images that differ by seed, noise model, enhancer or program version.
     Light,
-    /// An enhancer whose images may be read in a wrong way, or were resized for it.
+    /// An enhancer whose output may be misinterpreted, or whose images were resized.
     Enhancer,
-    /// Images that were turned when their files were read, or of which the file states a turn that was not made.
+    /// Images whose EXIF orientation was applied or ignored.
     Read,
-    /// Images of another size or encoding.
+    /// Images with a different size or encoding.
     Images,
-    /// Other words around the questions.
+    /// Different prompts.
     Prompts,
-    /// Other parameters of the models.
+    /// Different parameters of the models.
     Parameters,
-    /// A constraint on the replies of one side, or replies that do not keep it.
+    /// A constraint on the replies of some runs only, or replies that violate it.
     Constrain,
-    /// A model that stands apart from itself, because runs asked it in different ways or got other replies.
+    /// A model that is listed several times, because runs asked it in different ways or got different replies.
     Models,
-    /// Other models behind one name, or another address.
+    /// Different served models under one name, or different addresses.
     Served,
-    /// Another version of this program.
+    /// Different versions of this program.
     Version,
-    /// Levels that differ in brightness and not in noise.
+    /// Levels that differ in brightness but not in noise.
     Noise,
-    /// Photographs in the dark that are no pair of one exposure with their frames.
+    /// Dark photographs that do not match their frames in exposure.
     Pairs,
     /// Limits of the observer's numbers.
     Observer,
@@ -84,6 +84,6 @@ pub enum AlertKind {
 pub(crate) fn lines(alerts: &[Alert]) -> String {
     alerts
         .iter()
-        .map(|alert| line(["! ", &alert.text, "  "]))
+        .map(|alert| line("! ", &alert.text, "  "))
         .collect()
 }

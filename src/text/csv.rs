@@ -1,4 +1,4 @@
-//! Tables as CSV: [`files`], and [`safe`] texts in them. Numbers are written with all their digits.
+//! Tables as CSV ([`files`]), with texts that spreadsheets do not run as formulas ([`escape_formula`]). Numbers have all their digits.
 
 use std::borrow::{Borrow, Cow};
 use std::io::Write;
@@ -7,16 +7,16 @@ use serde::{Serialize, Serializer};
 
 use crate::error::{Error, Result};
 use crate::text::table::{SUMMARY, Table, TableCell};
-use crate::types::text::{is_hidden, written_out};
+use crate::types::text::{escape_where, is_hidden};
 
-/// One field of a row. A number has as many digits as are needed to read it back without loss.
+/// One field of a row. Numbers have enough digits to be parsed without loss.
 #[derive(Debug, Clone, Copy, Serialize)]
 #[serde(untagged)]
 pub(crate) enum CsvField<'a> {
     None,
     Text(&'a str),
     Count(usize),
-    /// A number as JSON writes it: `1.0`.
+    /// A number in the format of JSON: `1.0`.
     Number(f64),
     /// A number without a decimal point if it is an integer: `1`. Infinity is `inf`.
     #[serde(serialize_with = "plain")]
@@ -25,13 +25,13 @@ pub(crate) enum CsvField<'a> {
 
 #[expect(
     clippy::trivially_copy_pass_by_ref,
-    reason = "what serde calls it with"
+    reason = "serde passes a reference"
 )]
 fn plain<S: Serializer>(number: &f64, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_str(number)
 }
 
-/// The fields of a cell: one for each name of its column.
+/// The fields of a cell, one for each of the `names` CSV names of its column.
 pub(crate) fn fields(cell: &TableCell, names: usize) -> impl Iterator<Item = CsvField<'_>> {
     let mut fields = [CsvField::None; 4];
     match cell {
@@ -40,7 +40,7 @@ pub(crate) fn fields(cell: &TableCell, names: usize) -> impl Iterator<Item = Csv
         TableCell::Count(count) => fields[0] = CsvField::Count(*count),
         TableCell::Number(number) => fields[0] = CsvField::Number(*number),
         TableCell::Significance(verdict) => {
-            // `tied` stays for one release; the column `shown` states what it means.
+            // `tied` is kept for one release; the column `shown` states its meaning.
             let word = if verdict.is_shown() {
                 verdict.word()
             } else {
@@ -66,39 +66,37 @@ pub(crate) fn fields(cell: &TableCell, names: usize) -> impl Iterator<Item = Csv
     fields.into_iter().take(names)
 }
 
-/// A text as it stands in a cell of a CSV file, so that no spreadsheet runs it as a formula.
+/// Escapes a text for a cell of a CSV file, so that no spreadsheet runs it as a formula.
 ///
-/// A spreadsheet takes what begins with `=`, `+`, `-`, `@`, a tab or a carriage return for a formula, also after spaces, and also where the
-/// cell is quoted (OWASP, “CSV Injection”). Such a text gets an apostrophe in front, and so does one that begins with apostrophes and such a
-/// letter, so that taking one apostrophe away gives the text back. A number is no formula and stays. Tabs and hidden characters are
-/// written as `⟨U+001B⟩`; line breaks stay.
-pub(crate) fn safe(text: &str) -> Cow<'_, str> {
-    // A tab within a cell moves some readers to the next.
-    let shown = written_out(text, |c| c == '\t' || is_hidden(c));
+/// Spreadsheets run text that begins with `=`, `+`, `-`, `@`, a tab or a carriage return as a formula, also after spaces and in quoted
+/// cells (OWASP, “CSV Injection”). An apostrophe is put before such a text. The same is done if apostrophes precede such a character, so
+/// that removing one apostrophe always restores the text. Numbers are not changed. Tabs and hidden characters become codes such as
+/// `⟨U+001B⟩`; line breaks are kept.
+pub(crate) fn escape_formula(text: &str) -> Cow<'_, str> {
+    // Some readers interpret a tab within a cell as the end of the cell.
+    let visible = escape_where(text, |c| c == '\t' || is_hidden(c));
     if begins_formula(text) {
-        Cow::Owned(format!("'{shown}"))
+        Cow::Owned(format!("'{visible}"))
     } else {
-        shown
+        visible
     }
 }
 
-/// Whether a spreadsheet may run a text as a formula, with or without apostrophes before it.
+/// True if a spreadsheet may run a text as a formula, with or without apostrophes before it.
 fn begins_formula(text: &str) -> bool {
-    let begins = text.trim_start_matches([' ', '\u{a0}', '\u{3000}', '\n', '\'']);
-    let is_sign = |c: char| {
-        let full_width = ['＝', '＋', '－', '＠'];
-        ['=', '+', '-', '@', '\t', '\r'].contains(&c) || full_width.contains(&c)
-    };
-    begins.starts_with(is_sign) && !is_number(text)
+    const SIGNS: [char; 10] = ['=', '+', '-', '@', '\t', '\r', '＝', '＋', '－', '＠'];
+    let trimmed = text.trim_start_matches([' ', '\u{a0}', '\u{3000}', '\n', '\'']);
+    trimmed.starts_with(SIGNS) && !is_number(text)
 }
 
-/// Whether a text is a number in digits: neither a name for one, such as `-inf`, nor a sum.
+/// True if a text is a number in digits, but not for `-inf` or a sum.
 fn is_number(text: &str) -> bool {
-    let is_digit = |c: char| c.is_ascii_digit() || ".eE+-".contains(c);
-    text.chars().all(is_digit) && text.parse::<f64>().is_ok()
+    text.chars()
+        .all(|c| c.is_ascii_digit() || ".eE+-".contains(c))
+        && text.parse::<f64>().is_ok()
 }
 
-/// CSV files by name, of all tables that have CSV columns and at least one row. Tables of one name share one file.
+/// The names and contents of the CSV files of all tables with CSV columns and at least one row. Tables with the same name share a file.
 ///
 /// # Errors
 /// If one cannot be written.
@@ -113,7 +111,7 @@ pub(crate) fn files(tables: &[Table]) -> Result<Vec<(String, Vec<u8>)>> {
     Ok(files)
 }
 
-/// Tables with the same columns as one file: a header and rows. Empty if there is no row or no column.
+/// The content of one file with all these tables, which have the same columns: a header and rows. Empty without rows or columns.
 ///
 /// # Errors
 /// If the file cannot be written.
@@ -131,7 +129,6 @@ pub(crate) fn write<T: Borrow<Table>>(
     out: impl Write,
     parts: impl IntoIterator<Item = T>,
 ) -> Result<()> {
-    let failed = |e: ::csv::Error| Error::data("CSV", e);
     let mut file = ::csv::Writer::from_writer(out);
     let mut has_header = false;
     for table in parts {
@@ -142,12 +139,13 @@ pub(crate) fn write<T: Borrow<Table>>(
                 break;
             }
             if !has_header {
-                let names = names.clone().map(|name| safe(name).into_owned());
-                file.write_record(names).map_err(failed)?;
+                let names = names.clone().map(|name| escape_formula(name).into_owned());
+                file.write_record(names)
+                    .map_err(|e| Error::data("CSV", e))?;
                 has_header = true;
             }
-            let cells = table.cells(row);
-            let cells: Vec<CsvField<'_>> = cells
+            let cells: Vec<CsvField<'_>> = table
+                .cells(row)
                 .flat_map(|(column, cell)| fields(cell, column.heads.csv.len()))
                 .collect();
             let texts: Vec<Cow<'_, str>> = cells.iter().map(safe_text).collect();
@@ -156,21 +154,21 @@ pub(crate) fn write<T: Borrow<Table>>(
                 .zip(&texts)
                 .map(|(field, text)| match *field {
                     CsvField::Text(_) => CsvField::Text(text),
-                    // `summary.csv` and `summary.json` write numbers in the same way.
+                    // `summary.csv` has the number format of `summary.json`.
                     CsvField::Number(number) if table.name != SUMMARY => CsvField::Plain(number),
                     field => field,
                 })
                 .collect();
-            file.serialize(row).map_err(failed)?;
+            file.serialize(row).map_err(|e| Error::data("CSV", e))?;
         }
     }
     file.flush().map_err(|e| Error::data("CSV", e))
 }
 
-/// The text of a field as [`safe`] writes it; empty for a number.
+/// The text of a field after [`escape_formula`]; empty for a number.
 fn safe_text<'a>(field: &CsvField<'a>) -> Cow<'a, str> {
     match *field {
-        CsvField::Text(text) => safe(text),
+        CsvField::Text(text) => escape_formula(text),
         _ => Cow::Borrowed(""),
     }
 }
@@ -182,7 +180,7 @@ mod tests {
     use crate::text::table::TableBuilder;
 
     #[test]
-    fn a_text_that_a_spreadsheet_would_run_gets_an_apostrophe() {
+    fn formulas_get_an_apostrophe() {
         for formula in [
             "=HYPERLINK(\"http://x\",\"y\")",
             "=1+1",
@@ -197,25 +195,25 @@ mod tests {
             "'=1",
             "''@x",
         ] {
-            let safe = safe(formula);
+            let safe = escape_formula(formula);
             assert_eq!(safe.strip_prefix('\''), Some(formula), "{safe}");
         }
-        assert_eq!(safe("\t=1"), "'⟨U+0009⟩=1");
-        assert_eq!(safe("\r=1"), "'⟨U+000D⟩=1");
-        assert_eq!(safe("a\u{1b}[1m\r"), "a⟨U+001B⟩[1m⟨U+000D⟩");
+        assert_eq!(escape_formula("\t=1"), "'⟨U+0009⟩=1");
+        assert_eq!(escape_formula("\r=1"), "'⟨U+000D⟩=1");
+        assert_eq!(escape_formula("a\u{1b}[1m\r"), "a⟨U+001B⟩[1m⟨U+000D⟩");
     }
 
     #[test]
-    fn other_texts_and_numbers_stay() {
+    fn other_texts_and_numbers_are_kept() {
         for plain in [
             "", "a=1", "-4.8", "+3", "-1e-7", "'quoted'", "it's", "−4.8", "L3-noise", "a\nb",
         ] {
-            assert_eq!(safe(plain), plain);
+            assert_eq!(escape_formula(plain), plain);
         }
     }
 
     #[test]
-    fn cells_and_heads_of_a_file_are_safe_and_numbers_stay_numbers() -> Result<()> {
+    fn files_have_escaped_texts_and_plain_numbers() -> Result<()> {
         let table = TableBuilder::new("t", [("=cmd|' /C calc'!A0", -0.048), ("fine", 1.0)])
             .column(Text, "csv =name", |row| row.0)
             .column(Number, "csv n", |row| row.1)

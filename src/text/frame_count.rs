@@ -1,4 +1,4 @@
-//! How many frames a report is about, in words: [`frames`].
+//! The number of frames in a report, in words: [`frames`].
 
 use std::collections::BTreeMap;
 
@@ -6,15 +6,15 @@ use crate::text::words::counted;
 use crate::types::{FrameId, SentImages};
 use darkqa_score::grid::Grid;
 
-/// The number of frames that were asked about; where some stand for several images, as `3 frames (2 of 2 to 4 images)`.
+/// The number of frames that were asked about, as `3 frames (2 of 2 to 4 images)` if some questions show several images.
 pub(crate) fn frames(grid: &Grid<'_>) -> String {
     let mut images = BTreeMap::<&FrameId, usize>::new();
     for (place, item) in grid.items.iter().enumerate() {
-        let shown = (0..grid.subjects.len())
+        let counts = (0..grid.subjects.len())
             .filter_map(|subject| grid.trial(subject, place))
             .map(|trial| trial.images().map_or(0, SentImages::count));
         let most = images.entry(&*item.asked.frame).or_default();
-        *most = shown.max().unwrap_or(0).max(*most);
+        *most = counts.max().unwrap_or(0).max(*most);
     }
     let frames = counted(images.len(), "frame");
     let several: Vec<usize> = images.into_values().filter(|images| *images > 1).collect();

@@ -1,4 +1,4 @@
-//! Cells by series and level: [`Ladder`], and the columns of its table.
+//! [`Ladder`]: the cells of a table by series and level, and the columns of that table.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -31,23 +31,24 @@ impl<'a> Series<'a> {
         }
     }
 
-    /// Whether an enhancer made its images.
+    /// True if the images are enhanced.
     pub(crate) fn is_enhanced(&self) -> bool {
         self.enhancer.is_some()
     }
 
-    /// The quantity over which the series runs, which is light for the darkness of pairs; `None` for untouched frames.
+    /// The axis of the levels, which is light for the darkness of pairs; `None` for untouched frames.
     pub(crate) fn axis(&self) -> Option<Axis> {
         let pair = self.variant.pair.as_ref().map(|_| Axis::LIGHT);
         self.variant.kind.map(Kind::axis).or(pair)
     }
 
-    /// The variant and the enhancer in words, of photographs with how dark they are.
+    /// The variant and the enhancer in words; for photographs also their darkness.
     pub(crate) fn light(&self, pairs: &[PairDarkness]) -> String {
-        let mut pairs = pairs.iter();
-        let of = |pair: &&PairDarkness| Some(&pair.name) == self.variant.photograph();
         let words = light(self.variant, self.enhancer);
-        match pairs.find(of) {
+        let pair = pairs
+            .iter()
+            .find(|pair| Some(&pair.name) == self.variant.photograph());
+        match pair {
             None => words,
             Some(pair) => words.replacen("(real)", &format!("(real, {})", pair.short()), 1),
         }
@@ -67,7 +68,7 @@ pub(crate) struct Ladder<'a, C> {
     pub(crate) series: BTreeMap<Series<'a>, SeriesByLevel<'a, C>>,
     /// Cells without a level: models without images, and chance.
     pub(crate) without_level: Vec<(&'a ModelInCondition, &'a C)>,
-    /// How dark the photographs in the dark are.
+    /// The darkness of the photographs in the dark.
     pub(crate) pairs: &'a [PairDarkness],
     /// The light in which the photographs of the set were taken.
     pub(crate) set: SetLight,
@@ -100,8 +101,8 @@ impl<'a, C> Ladder<'a, C> {
         ladder
     }
 
-    /// The same, which states how dark the photographs in the dark are, and calls L0 as the light of the set wants it.
-    pub(crate) fn in_light_of(self, findings: &'a Findings<'_>) -> Self {
+    /// Adds the darkness of the photographs, and the light of the set, which decides the label of L0.
+    pub(crate) fn with_pairs(self, findings: &'a Findings<'_>) -> Self {
         Self {
             pairs: &findings.pairs,
             set: findings.set.light,
@@ -114,14 +115,14 @@ impl<'a, C> Ladder<'a, C> {
         let words = series.light(self.pairs);
         match self.set {
             SetLight::Lit => words,
-            SetLight::Dark => words.replacen("untouched", self.set.untouched(), 1),
+            SetLight::Dark => words.replacen("untouched", self.set.l0_label(), 1),
         }
     }
 
-    /// The name of a level at the head of a column.
+    /// The column head of a level.
     pub(crate) fn head(&self, level: AxisLevel) -> String {
         match level {
-            AxisLevel::L0 => self.set.untouched().to_owned(),
+            AxisLevel::L0 => self.set.l0_label().to_owned(),
             level => level.to_string(),
         }
     }
@@ -134,18 +135,17 @@ impl<'a, C> Ladder<'a, C> {
     /// Adds the cells of the clean frames to every series of the same model without an enhancer, and those of the enhanced clean
     /// frames to every series with that enhancer. They stay a separate series only if the model has no such series.
     pub(crate) fn with_clean(mut self) -> Self {
-        let is_clean = |series: &Series<'_>| series.variant.is_untouched();
         let (clean, mut degraded): (BTreeMap<_, _>, BTreeMap<_, _>) = self
             .series
             .into_iter()
-            .partition(|(series, _)| is_clean(series));
+            .partition(|(series, _)| series.variant.is_untouched());
         for (series, cells) in clean {
             let mut same_model = degraded
                 .iter_mut()
                 .filter(|(other, _)| {
                     let groups = [other, &series].map(|series| series.variant.group.as_ref());
                     (other.model, other.enhancer) == (series.model, series.enhancer)
-                        && RunGroup::meet(groups[0], groups[1])
+                        && RunGroup::overlap(groups[0], groups[1])
                 })
                 .peekable();
             if same_model.peek().is_some() {
@@ -160,17 +160,21 @@ impl<'a, C> Ladder<'a, C> {
 
     /// The ladder of each axis, light first. Series and cells without an axis are in each of them.
     pub(crate) fn by_axis(&self) -> Vec<(Axis, Self)> {
-        let is_on = |series: &Series<'_>, axis| series.axis() == Some(axis);
-        Axis::present(|axis| self.series.keys().any(|series| is_on(series, axis)))
+        Axis::present(|axis| self.series.keys().any(|series| series.axis() == Some(axis)))
             .into_iter()
             .map(|axis| {
-                let series = self.series.iter();
-                let series = series.filter(|(series, _)| series.axis().is_none_or(|on| on == axis));
-                let levels = self.levels.iter().copied();
                 let ladder = Self {
                     models: self.models.clone(),
-                    levels: levels.filter(|level| level.is_shown_on(axis)).collect(),
-                    series: series
+                    levels: self
+                        .levels
+                        .iter()
+                        .copied()
+                        .filter(|level| level.belongs_to(axis))
+                        .collect(),
+                    series: self
+                        .series
+                        .iter()
+                        .filter(|(series, _)| series.axis().is_none_or(|own| own == axis))
                         .map(|(series, cells)| (series.clone(), cells.clone()))
                         .collect(),
                     without_level: self.without_level.clone(),
@@ -182,15 +186,15 @@ impl<'a, C> Ladder<'a, C> {
             .collect()
     }
 
-    /// The cell of a series at L0, [with the clean frames](Self::with_clean); for an enhancer that was not asked about them, the cell
-    /// without an enhancer.
-    pub(crate) fn start(&self, series: &Series<'_>) -> Option<&'a C> {
+    /// The cell of a series at L0, after [`with_clean`](Self::with_clean). For an enhancer without clean frames, the cell without an
+    /// enhancer.
+    pub(crate) fn l0_cell(&self, series: &Series<'_>) -> Option<&'a C> {
         let raw = self.series.iter().filter(|(other, _)| {
             let is_clean = other.variant.is_untouched();
             let groups = [*other, series].map(|series| series.variant.group.as_ref());
             (other.model, other.enhancer) == (series.model, None)
                 && (other.variant == series.variant
-                    || is_clean && RunGroup::meet(groups[0], groups[1]))
+                    || is_clean && RunGroup::overlap(groups[0], groups[1]))
         });
         let mut cells = self
             .series
@@ -202,21 +206,23 @@ impl<'a, C> Ladder<'a, C> {
 
     /// The rows of a table: the series of each model, and below them the model without images; chance at the end.
     pub(crate) fn rows(&'a self) -> Vec<LadderRow<'a, C>> {
-        let series = self.series.iter();
-        let series = series.map(|(series, cells)| (series.place, LadderRow::Series(series, cells)));
+        let series = self
+            .series
+            .iter()
+            .map(|(series, cells)| (series.place, LadderRow::Series(series, cells)));
         let without_level = self.without_level.iter().map(|&(subject, cell)| {
             let place = subject.view.and_then(|_| self.place(&subject.model));
             let row = LadderRow::WithoutLevel(subject, cell);
             (place.unwrap_or(usize::MAX), row)
         });
         let mut rows: Vec<(usize, LadderRow<'a, C>)> = series.chain(without_level).collect();
-        // Stable: the rows of a model stay in their order.
+        // The sort is stable, so the rows of a model keep their order.
         rows.sort_by_key(|(place, _)| *place);
         rows.into_iter().map(|(_, row)| row).collect()
     }
 
-    /// A table with a row for each series and a column for each level, divided by the groups of models, and with their marks and further columns. The page and LaTeX also have a row for each subject
-    /// without a level.
+    /// A table with a row for each series and a column for each level, with the groups, marks and extra columns of the models. The page and
+    /// LaTeX also have a row for each subject without a level.
     pub(crate) fn table(
         &'a self,
         name: &'static str,
@@ -256,14 +262,14 @@ impl<'a, C> Ladder<'a, C> {
             let head = column.head();
             let heads = format!("page {head} | terminal {head} | latex {head}");
             table = table.column(Text, &*heads, |line| {
-                listing.fact(*column, line.model()).to_owned()
+                listing.cell(*column, line.model()).to_owned()
             });
         }
-        table.foot(listing.foot(self.models.iter().copied()))
+        table.foot(listing.footnote(self.models.iter().copied()))
     }
 }
 
-/// A row of the table.
+/// A row of the table of a [`Ladder`].
 pub(crate) enum LadderRow<'a, C> {
     /// A series with its cells by level.
     Series(&'a Series<'a>, &'a SeriesByLevel<'a, C>),

@@ -1,14 +1,14 @@
-//! Tables as LaTeX with booktabs: [`tables`].
+//! Tables in LaTeX, with the package booktabs: [`tables`].
 
 use std::fmt::Write;
 
-use crate::text::table::{Column, ColumnKind, Table, TableCell, TableFormat};
+use crate::text::table::{ColumnKind, Table, TableCell, TableFormat};
 use crate::text::words::{interval, percent, points, words};
-use crate::types::text::shown;
+use crate::types::text::escape_hidden;
 use darkqa_score::estimate::Estimate;
 use darkqa_score::significance::Significance;
 
-/// The findings as a list, then all tables that have a LaTeX caption; `head` names them in the first comment line.
+/// The findings as a list, then all tables that have a LaTeX caption. The first comment line begins with `head`.
 #[must_use]
 pub(crate) fn tables(head: &str, findings: &[String], tables: &[Table]) -> String {
     let mut text = format!(
@@ -18,7 +18,7 @@ pub(crate) fn tables(head: &str, findings: &[String], tables: &[Table]) -> Strin
     if !findings.is_empty() {
         text += "\n\\begin{itemize}\\sloppy\n";
         for finding in findings {
-            let _ = writeln!(text, "  \\item {}", escaped(finding));
+            let _ = writeln!(text, "  \\item {}", escape(finding));
         }
         text += "\\end{itemize}\n";
     }
@@ -30,10 +30,10 @@ pub(crate) fn tables(head: &str, findings: &[String], tables: &[Table]) -> Strin
     text
 }
 
-/// Text with the special characters of LaTeX escaped.
-pub(crate) fn escaped(text: &str) -> String {
+/// Escapes the special characters of LaTeX.
+pub(crate) fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
-    for c in shown(text).chars() {
+    for c in escape_hidden(text).chars() {
         match c {
             '⟨' => escaped.push_str("$\\langle$"),
             '⟩' => escaped.push_str("$\\rangle$"),
@@ -57,41 +57,45 @@ pub(crate) fn escaped(text: &str) -> String {
     escaped
 }
 
-/// Makes what follows smaller where it is wider than the text.
+/// LaTeX code that scales the next group down if it is wider than the text.
 const FIT: &str = "\\resizebox{\\ifdim\\width>\\linewidth\\linewidth\\else\\width\\fi}{!}";
 
-/// Most rows of a table on a page (chosen: of `\footnotesize`, with caption and foot).
-pub(crate) const MOST_ROWS: usize = 40;
+/// Maximum number of rows of a table on one page, in `\footnotesize` with caption and footnote; chosen.
+pub(crate) const MAX_ROWS: usize = 40;
 
-/// A table as floats of at most [`MOST_ROWS`] rows each, no wider than the text.
+/// A table as one or more floats of at most [`MAX_ROWS`] rows, no wider than the text.
 fn table(caption: &str, table: &Table) -> String {
-    let named = |column: &&Column| column.heads.latex.is_some();
-    let columns = table.columns.iter().filter(named);
-    let alignments = columns.clone().map(|column| match column.kind {
-        ColumnKind::Text | ColumnKind::Significance => 'l',
-        _ => 'r',
-    });
-    let heads = columns.filter_map(|column| column.heads.latex.clone());
-    let line = |cells: Vec<String>| format!("    {} \\\\\n", cells.join(" & "));
-    let alignments: String = alignments.collect();
-    let heads = line(heads.collect());
+    let columns = table
+        .columns
+        .iter()
+        .filter(|column| column.heads.latex.is_some());
+    let alignments: String = columns
+        .clone()
+        .map(|column| match column.kind {
+            ColumnKind::Text | ColumnKind::Significance => 'l',
+            _ => 'r',
+        })
+        .collect();
+    let heads = line(columns.filter_map(|column| column.heads.latex.clone()));
     let rows: Vec<(Option<&str>, String)> = table
         .headed_rows_in(TableFormat::Latex)
         .map(|(heading, row)| {
             let cells = table
                 .cells(row)
-                .filter(|(column, _)| named(column))
+                .filter(|(column, _)| column.heads.latex.is_some())
                 .map(|(column, cell)| cell_text(column.kind, cell));
-            (heading, line(cells.collect()))
+            (heading, line(cells))
         })
         .collect();
-    let foot = table.foot.as_deref();
-    let foot = foot.map(|foot| format!("\n  {{\\footnotesize {}}}\n", escaped(foot)));
+    let foot = table
+        .foot
+        .as_deref()
+        .map(|foot| format!("\n  {{\\footnotesize {}}}\n", escape(foot)));
     let mut text = String::new();
-    let parts = rows.len().div_ceil(MOST_ROWS).max(1);
+    let parts = rows.len().div_ceil(MAX_ROWS).max(1);
     for part in 0..parts {
-        let first = part * MOST_ROWS;
-        let rows = &rows[first..rows.len().min(first + MOST_ROWS)];
+        let first = part * MAX_ROWS;
+        let rows = &rows[first..rows.len().min(first + MAX_ROWS)];
         let place = match parts {
             1 => String::new(),
             _ => format!(" (part {} of {parts})", part + 1),
@@ -107,7 +111,13 @@ fn table(caption: &str, table: &Table) -> String {
     text
 }
 
-/// Rows with their headings and the rules between.
+/// A row of a LaTeX table.
+fn line(cells: impl Iterator<Item = String>) -> String {
+    let cells: Vec<String> = cells.collect();
+    format!("    {} \\\\\n", cells.join(" & "))
+}
+
+/// Rows with their headings, and rules between groups.
 fn body(rows: &[(Option<&str>, String)], width: usize) -> String {
     let mut text = String::new();
     for (index, (heading, row)) in rows.iter().enumerate() {
@@ -116,7 +126,7 @@ fn body(rows: &[(Option<&str>, String)], width: usize) -> String {
                 text += "    \\midrule\n";
             }
             if !heading.is_empty() {
-                let heading = escaped(heading);
+                let heading = escape(heading);
                 let _ = writeln!(
                     text,
                     "    \\multicolumn{{{width}}}{{l}}{{\\textit{{{heading}}}}} \\\\"
@@ -142,14 +152,14 @@ fn cell_text(kind: ColumnKind, cell: &TableCell) -> String {
             stacked(&number, *share)
         }
         (_, TableCell::Changed(share, Some(change))) => {
-            let change = escaped(&points(*change));
+            let change = escape(&points(*change));
             let number = format!("{} {{\\scriptsize({change})}}", percent(share.value));
             stacked(&number, *share)
         }
         (_, TableCell::Significance(Significance::Better)) => "helps".to_owned(),
         (_, TableCell::Significance(Significance::Worse)) => "harms".to_owned(),
         _ => {
-            let text = escaped(&words(kind, cell));
+            let text = escape(&words(kind, cell));
             interval(kind, cell).map_or(text.clone(), |share| stacked(&text, share))
         }
     }
@@ -162,7 +172,7 @@ mod tests {
     #[test]
     fn special_characters_are_escaped() {
         assert_eq!(
-            escaped("50% a_b & {c} \\ ^~#$ −1 < †"),
+            escape("50% a_b & {c} \\ ^~#$ −1 < †"),
             "50\\% a\\_b \\& \\{c\\} \\textbackslash{} \\textasciicircum{}\\textasciitilde{}\\#\\$ $-$1 $<$ $\\dagger$"
         );
     }

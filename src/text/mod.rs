@@ -1,4 +1,4 @@
-//! Numbers as text: words, the [`table`] model, and its formats for the terminal, CSV and LaTeX.
+//! Text of reports: numbers and names in words, and tables ([`table`]) for the terminal, CSV and LaTeX.
 
 pub(crate) mod alert;
 pub(crate) mod csv;

@@ -1,4 +1,4 @@
-//! The noise profiles that a report has noisy images in: [`NoiseProfiles`].
+//! [`NoiseProfiles`]: the noise profiles of the images in a report.
 
 use std::collections::BTreeSet;
 
@@ -14,15 +14,15 @@ pub(crate) struct NoiseProfiles(BTreeSet<ReadingName>);
 
 impl NoiseProfiles {
     pub(crate) fn new<'s>(subjects: impl IntoIterator<Item = &'s ModelInCondition>) -> Self {
-        let subjects = subjects.into_iter();
         Self(
             subjects
+                .into_iter()
                 .filter_map(|subject| subject.variant.reading.clone())
                 .collect(),
         )
     }
 
-    /// The open question of a single noise profile, and how the others are asked; `None` without noise or with several readings.
+    /// A note that other noise profiles were not run, with the flags to run them; `None` without noise or with several noise profiles.
     pub(crate) fn open_question(&self) -> Option<String> {
         let mut readings = self.0.iter();
         let (Some(only), None) = (readings.next(), readings.next()) else {
@@ -41,28 +41,26 @@ mod tests {
     use crate::types::Condition;
 
     #[test]
-    fn one_reading_alone_leaves_a_question_open() {
-        let of = |conditions: &[&str]| {
-            let conditions: Vec<Condition> = conditions
-                .iter()
-                .map(|text| text.parse().unwrap())
-                .collect();
-            let subjects: Vec<ModelInCondition> = conditions
-                .iter()
-                .map(|c| ModelInCondition::new("m", Some(c)))
-                .collect();
-            NoiseProfiles::new(&subjects)
-        };
-        let one = of(&["L0", "L3-ev", "L3-noise@eld", "L5-noise@eld+lift"]);
-        let said = one.open_question().unwrap();
-        assert!(said.starts_with("One noise profile was run (eld). "));
+    fn single_profile_leaves_a_question_open() {
+        let one = profiles(&["L0", "L3-ev", "L3-noise@eld", "L5-noise@eld+lift"]);
+        let note = one.open_question().unwrap();
+        assert!(note.starts_with("One noise profile was run (eld). "));
         for conditions in [&["L0", "L3-ev"][..], &["L3-noise", "L3-noise@physical"]] {
-            assert_eq!(of(conditions).open_question(), None, "{conditions:?}");
+            assert_eq!(profiles(conditions).open_question(), None, "{conditions:?}");
         }
-        let several = of(&["L3-noise@eld", "L3-noise"]);
+        let several = profiles(&["L3-noise@eld", "L3-noise"]);
         assert_eq!(
             serde_json::to_string(&several).unwrap(),
             r#"["paper","eld"]"#
         );
+    }
+
+    fn profiles(conditions: &[&str]) -> NoiseProfiles {
+        let subjects: Vec<ModelInCondition> = conditions
+            .iter()
+            .map(|text| text.parse::<Condition>().unwrap())
+            .map(|condition| ModelInCondition::new("m", Some(&condition)))
+            .collect();
+        NoiseProfiles::new(&subjects)
     }
 }

@@ -1,4 +1,5 @@
-//! The outcome of a trial in words: [`outcome`], and why a reply was not read ([`unread`]) or no reply came ([`failed`]).
+//! The outcome of a trial in words: [`outcome`], the reason why a reply was not read ([`unread_reason`]), and why no reply came
+//! ([`failure_reason`]).
 
 use crate::types::{FailureKind, Record, TrialOutcome, UnreadReason};
 
@@ -10,18 +11,18 @@ pub(crate) fn outcome(record: &Record) -> String {
         TrialOutcome::Answered => "answered".to_owned(),
         TrialOutcome::Unparsed => match record.detail.strict.and_then(|strict| strict.why) {
             None => "not read".to_owned(),
-            Some(UnreadReason::CannotTell) => unread(UnreadReason::CannotTell).to_owned(),
-            Some(why) => format!("not read ({})", unread(why)),
+            Some(UnreadReason::CannotTell) => unread_reason(UnreadReason::CannotTell).to_owned(),
+            Some(why) => format!("not read ({})", unread_reason(why)),
         },
         TrialOutcome::Failed => match &record.failure {
             None => "failed".to_owned(),
-            Some(failure) => format!("failed ({})", failed(failure.kind, failure.status)),
+            Some(failure) => format!("failed ({})", failure_reason(failure.kind, failure.status)),
         },
     }
 }
 
-/// Why the strict parsing found no choice in a reply.
-pub(crate) fn unread(why: UnreadReason) -> &'static str {
+/// The reason in words why the strict parsing found no choice in a reply.
+pub(crate) fn unread_reason(why: UnreadReason) -> &'static str {
     match why {
         UnreadReason::Empty => "the reply is empty",
         UnreadReason::Refused => "the model refused",
@@ -36,8 +37,8 @@ pub(crate) fn unread(why: UnreadReason) -> &'static str {
     }
 }
 
-/// Why no reply came, with the HTTP status if the server sent one; the error's own text is in its message.
-pub(crate) fn failed(kind: FailureKind, status: Option<u16>) -> String {
+/// The reason in words why no reply came, with the HTTP status if the server sent one.
+pub(crate) fn failure_reason(kind: FailureKind, status: Option<u16>) -> String {
     let kind = match kind {
         FailureKind::Connection => "no connection",
         FailureKind::Timeout => "no whole reply in time",
@@ -59,16 +60,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_reason_has_words_of_its_own() {
+    fn reasons_have_different_words() {
         let reasons: std::collections::BTreeSet<&str> =
-            UnreadReason::ALL.into_iter().map(unread).collect();
+            UnreadReason::ALL.into_iter().map(unread_reason).collect();
         assert_eq!(reasons.len(), UnreadReason::ALL.len());
         let kinds: std::collections::BTreeSet<String> = FailureKind::ALL
             .into_iter()
-            .map(|kind| failed(kind, None))
+            .map(|kind| failure_reason(kind, None))
             .collect();
         assert_eq!(kinds.len(), FailureKind::ALL.len());
-        let status = failed(FailureKind::RateLimit, Some(429));
+        let status = failure_reason(FailureKind::RateLimit, Some(429));
         assert_eq!(status, "refused by a rate limit, HTTP 429");
     }
 }

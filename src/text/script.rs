@@ -1,15 +1,15 @@
-//! Data in a script of a page: [`embedded`].
+//! Data in a `script` element of an HTML page: [`to_script_json`].
 
 use serde::Serialize;
 
 use crate::error::{Error, Result};
 
-/// A value as JSON for a `script` element, as a program or as data, escaped so that nothing in it ends the script or opens a comment.
+/// A value as JSON for a `script` element, escaped so that it cannot end the script or open a comment.
 ///
 /// # Errors
-/// If the value cannot be written.
-pub(crate) fn embedded<T: Serialize>(value: &T) -> Result<String> {
+/// If the value cannot be serialized.
+pub(crate) fn to_script_json<T: Serialize>(value: &T) -> Result<String> {
     let text = serde_json::to_string(value).map_err(|e| Error::data("page", e))?;
-    // A bracket stands in strings alone.
+    // In JSON, `<` occurs only inside strings.
     Ok(text.replace('<', "\\u003c"))
 }

@@ -1,5 +1,5 @@
-//! One table of a report: [`Table`], its [`Column`]s and [`TableCell`]s. It holds numbers. The modules that write it format
-//! them: `csv`, `latex` and `terminal` here, the JSON and the page of a report.
+//! One table of a report: [`Table`], its [`Column`]s and [`TableCell`]s. Cells contain unformatted numbers, which each output formats: the
+//! modules `csv`, `latex` and `terminal`, and the JSON and the page of a report.
 
 use darkqa_score::estimate::Estimate;
 use darkqa_score::significance::Significance;
@@ -8,7 +8,7 @@ use darkqa_score::threshold::Threshold;
 /// Name of the table of all accuracies, whose numbers are written with all their digits.
 pub(crate) const SUMMARY: &str = "summary";
 
-/// A table of numbers. A format for which it has no title leaves it out.
+/// A table of numbers. An output leaves the table out if the table has no title for it.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Table {
     /// Name of its CSV file without the extension. Tables with the same name are parts of one file.
@@ -17,7 +17,7 @@ pub struct Table {
     pub section: &'static str,
     /// Caption on the page.
     pub caption: String,
-    /// Whether the page shows it only on request. Long tables are always folded.
+    /// True if the page shows the table folded. Long tables are always folded.
     pub is_folded: bool,
     /// Line above it in the terminal, which may be empty; `None` if it is not printed. Tables with the same name and heading are
     /// printed as one.
@@ -37,17 +37,17 @@ pub struct Table {
 pub struct TableRow {
     /// A cell for each column.
     pub cells: Vec<TableCell>,
-    /// The heading above it and the rows after it with the same one; `None` without one.
+    /// The heading of the group of rows that the row belongs to; `None` without a heading.
     pub group: Option<String>,
-    /// Whether its name is bold in tables of papers: the model is shown to be better than every other.
+    /// True if the model is detected to be better than every other; its name is bold in tables for papers.
     pub is_best: bool,
     /// Formats that leave the row out.
     pub hidden_in: Vec<TableFormat>,
 }
 
 impl TableRow {
-    /// A row with room for the cells of any table.
-    fn wide() -> Self {
+    /// An empty row with capacity for the cells of any table.
+    fn with_capacity() -> Self {
         Self {
             cells: Vec::with_capacity(12),
             ..Self::default()
@@ -88,9 +88,9 @@ pub struct ColumnHeads {
 pub enum ColumnKind {
     /// Text, left aligned.
     Text,
-    /// A number of things.
+    /// A count.
     Count,
-    /// A number of failures, which the page highlights if it is not 0.
+    /// A count of failures, which the page highlights if it is not 0.
     Failures,
     /// A plain number; two decimals except in files.
     Number,
@@ -119,19 +119,19 @@ pub enum TableCell {
     Blank,
     /// The question of the cell was not asked.
     Absent,
-    /// There is no number, because no reply can be counted.
+    /// No number, because no reply can be counted.
     Missing,
     /// The number is not known; the text states why.
     Unknown(String),
     /// Text of any length.
     Text(String),
-    /// A number of things.
+    /// A count.
     Count(usize),
     /// A number without an interval.
     Number(f64),
     /// A number with its interval.
     Estimate(Estimate),
-    /// An accuracy that is shown to be below that of a model without images.
+    /// An accuracy that is detected to be below that of a model without images.
     Below(Estimate),
     /// Expected accuracy of guessing.
     Guess(Estimate),
@@ -147,7 +147,7 @@ pub enum TableCell {
     Significance(Significance),
 }
 
-/// Conversions of values into the cells that hold them.
+/// Implements `From` for values that have a cell type.
 macro_rules! cell_from {
     ($($type:ty => $variant:ident,)*) => {$(
         impl From<$type> for TableCell {
@@ -180,10 +180,9 @@ impl From<&str> for ColumnHeads {
         let mut heads = Self::default();
         for part in names.split(" | ") {
             let (format, name) = part.split_once(' ').unwrap_or((part, ""));
-            let split_by = |by: &str| name.split(by).map(str::to_owned).collect();
             match format {
-                "csv" => heads.csv = split_by(" "),
-                "terminal" => heads.terminal = split_by(", "),
+                "csv" => heads.csv = name.split(' ').map(str::to_owned).collect(),
+                "terminal" => heads.terminal = name.split(", ").map(str::to_owned).collect(),
                 "page" => heads.page = Some(name.to_owned()),
                 _ => heads.latex = Some(name.to_owned()),
             }
@@ -203,13 +202,13 @@ impl<T> TableBuilder<T> {
         let items: Vec<T> = items.into_iter().collect();
         let table = Table {
             name,
-            rows: items.iter().map(|_| TableRow::wide()).collect(),
+            rows: items.iter().map(|_| TableRow::with_capacity()).collect(),
             ..Table::default()
         };
         Self { table, items }
     }
 
-    /// Section of the page, and caption there.
+    /// Sets the section of the page and the caption there.
     pub(crate) fn page(mut self, section: &'static str, caption: &str) -> Self {
         self.table.section = section;
         caption.clone_into(&mut self.table.caption);
@@ -231,7 +230,7 @@ impl<T> TableBuilder<T> {
         self
     }
 
-    /// Divides the rows by the headings of items.
+    /// Groups the rows by the headings of their items.
     pub(crate) fn group(mut self, heading: impl Fn(&T) -> Option<String>) -> Self {
         for (row, item) in self.table.rows.iter_mut().zip(&self.items) {
             row.group = heading(item);
@@ -239,7 +238,7 @@ impl<T> TableBuilder<T> {
         self
     }
 
-    /// Adds the line that explains the marks.
+    /// Sets the footnote that explains the marks.
     pub(crate) fn foot(mut self, foot: Option<String>) -> Self {
         self.table.foot = foot;
         self
@@ -262,13 +261,13 @@ impl<T> TableBuilder<T> {
 }
 
 impl Table {
-    /// The table in files alone: nothing of it is printed, on the page or in LaTeX.
+    /// Restricts the table to its CSV file: it is not printed, nor shown on the page or in LaTeX.
     pub(crate) fn in_files_only(mut self) -> Self {
         (self.section, self.heading, self.latex) = ("", None, None);
         self
     }
 
-    /// The table without its file.
+    /// Removes the CSV columns, so that the table is not written to a file.
     pub(crate) fn without_file(mut self) -> Self {
         for column in &mut self.columns {
             column.heads.csv.clear();
@@ -283,8 +282,8 @@ impl Table {
             .filter(move |row| !row.hidden_in.contains(&format))
     }
 
-    /// The rows that a format shows, each with the heading that stands above it: empty where the rows of a group end, `None` within
-    /// one.
+    /// The rows that a format shows. The first row of a group has its heading, and the first row after a group an empty heading; all other
+    /// rows have `None`.
     pub(crate) fn headed_rows_in(
         &self,
         format: TableFormat,
@@ -324,7 +323,7 @@ mod tests {
     }
 
     #[test]
-    fn cells_belong_to_their_columns_and_rows_can_be_hidden() {
+    fn rows_can_be_hidden_in_a_format() {
         let table = TableBuilder::new("t", [1_usize, 2])
             .column(ColumnKind::Count, "csv n", |n| *n)
             .column(ColumnKind::Text, "page word", |n| {

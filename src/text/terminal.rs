@@ -5,11 +5,13 @@ mod fitted;
 use self::fitted::{TextColumn, TextRow, TextTable};
 use crate::text::table::{Column, ColumnKind, Table, TableCell, TableFormat};
 use crate::text::width;
-use crate::text::words::{interval, percent, points, reach, reach_of, stops, with_interval, words};
+use crate::text::words::{
+    interval, percent, points, reach, stops, widest_reach_of, with_interval, words,
+};
 use crate::text::wrapped::wrapped_to;
 use crate::types::manifests::{Counts, RunManifest, Status};
 
-/// The lenient number in brackets if it differs from the strict one; otherwise empty.
+/// The lenient number in brackets, ` (LENIENT)`, if it differs from the strict one; otherwise empty.
 pub(crate) fn differing(strict: &str, lenient: &str) -> String {
     if strict == lenient {
         String::new()
@@ -38,38 +40,39 @@ pub(crate) fn texts(kind: ColumnKind, cell: &TableCell) -> Vec<String> {
     }
 }
 
-/// Text in lines as wide as the terminal: the beginning of the first line, the text, and the beginning of the others.
-pub(crate) fn line(parts: [&str; 3]) -> String {
-    wrapped_to(width::columns(), parts)
+/// Wraps a text at the width of the terminal. The first line begins with `first`, the others with `rest`.
+pub(crate) fn line(first: &str, text: &str, rest: &str) -> String {
+    wrapped_to(width::columns(), first, text, rest)
 }
 
 /// All tables that have a heading, each with its heading and notes.
 #[must_use]
 pub(crate) fn render(tables: &[Table]) -> String {
     let mut text = String::new();
-    let key = |table: &Table| (table.name, table.heading.clone());
-    for parts in tables.chunk_by(|table, next| key(table) == key(next)) {
+    for parts in
+        tables.chunk_by(|table, next| (table.name, &table.heading) == (next.name, &next.heading))
+    {
         let Some(heading) = &parts[0].heading else {
             continue;
         };
         if !heading.is_empty() {
-            text += &line(["", heading, " "]);
+            text += &line("", heading, " ");
         }
         text += &table(parts);
         let notes = parts.iter().flat_map(|table| &table.notes);
         let foot = parts.iter().filter_map(|table| table.foot.as_ref()).take(1);
         for note in notes.chain(foot) {
-            text += &line(["", note, " "]);
+            text += &line("", note, " ");
         }
     }
     text
 }
 
-/// Name of the column with the widest reach of the intervals of a row.
+/// Head of the column with the widest interval of a row.
 const REACH: &str = "95 %";
 
-/// Tables with the same columns as one table; empty without a row. A table of accuracies has a last column with the reach of its
-/// intervals.
+/// Formats tables with the same columns as one table; empty without rows. A table of accuracies has a last column with the widest interval
+/// of each row.
 #[must_use]
 pub(crate) fn table(parts: &[Table]) -> String {
     let columns = parts.iter().take(1).flat_map(|table| &table.columns);
@@ -92,8 +95,9 @@ pub(crate) fn table(parts: &[Table]) -> String {
             if let Some(heading) = heading.filter(|heading| !heading.is_empty()) {
                 rows.push(TextRow::Heading(heading.to_owned()));
             }
-            let cells = table.cells(row);
-            let cells = cells.filter(|(column, _)| !column.heads.terminal.is_empty());
+            let cells = table
+                .cells(row)
+                .filter(|(column, _)| !column.heads.terminal.is_empty());
             let reach = has_reach.then(|| widest_reach(cells.clone()));
             let texts = cells.flat_map(|(column, cell)| texts(column.kind, cell));
             rows.push(TextRow::Cells(texts.chain(reach).collect()));
@@ -103,13 +107,13 @@ pub(crate) fn table(parts: &[Table]) -> String {
         columns: heads.chain(reach).collect(),
         rows,
     };
-    table.fitted(width::columns())
+    table.format_to(width::columns())
 }
 
-/// How far the widest interval of these cells reaches down and up, as `−7.7 +7.1`; empty if no cell has one.
+/// The largest distances of these cells' estimates to the ends of their intervals, as `−7.7 +7.1`; empty if no cell has an interval.
 fn widest_reach<'t>(cells: impl Iterator<Item = (&'t Column, &'t TableCell)>) -> String {
     let accuracies = cells.filter(|(column, _)| column.kind == ColumnKind::Accuracy);
-    reach_of(accuracies.filter_map(|(column, cell)| interval(column.kind, cell)))
+    widest_reach_of(accuracies.filter_map(|(column, cell)| interval(column.kind, cell)))
 }
 
 /// A line with the progress of a run; empty if the run is complete.

@@ -48,7 +48,7 @@ pub(crate) fn plural(number: usize, one: &str, several: &str) -> String {
 }
 
 /// Shortens a name to `width` characters by replacing its middle with `…`. Shorter names are unchanged.
-pub(crate) fn shortened(name: &str, width: usize) -> String {
+pub(crate) fn shorten_middle(name: &str, width: usize) -> String {
     let chars: Vec<char> = name.chars().collect();
     if chars.len() <= width {
         return name.to_owned();
@@ -95,7 +95,7 @@ pub(crate) fn p(value: f64) -> String {
     }
 }
 
-/// Interval of an exposure drop in EV, such as `1.2 to 3.4`; `–` if even its lower end is infinite, that is, beyond the darkest level.
+/// Interval of an exposure drop in EV, such as `1.2 to 3.4`; `–` if even its lower end is infinite (beyond the darkest level).
 pub(crate) fn reach(low: f64, high: f64, darkest: f64) -> String {
     if low.is_infinite() {
         "–".to_owned()
@@ -136,7 +136,7 @@ pub(crate) fn interval(kind: ColumnKind, cell: &TableCell) -> Option<Estimate> {
 
 /// Largest distances from an estimate down and up to the ends of its interval, in percentage points, such as `−7.7 +7.1`; empty
 /// without estimates.
-pub(crate) fn reach_of(shares: impl Iterator<Item = Estimate>) -> String {
+pub(crate) fn widest_reach_of(shares: impl Iterator<Item = Estimate>) -> String {
     shares
         .map(|share| [share.value - share.low, share.high - share.value])
         .fold(None, |widest: Option<[f64; 2]>, [down, up]| {

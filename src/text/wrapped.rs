@@ -1,17 +1,18 @@
-//! Text in lines of one width: [`wrapped`].
+//! Text wrapped into lines: [`wrapped`].
 
 use crate::text::width::columns;
 
-/// Width of the text in characters, where the terminal has room for it.
+/// Maximum width of a line in characters.
 pub(crate) const WIDTH: usize = 80;
 
-/// Text in lines of [`WIDTH`] characters, or as many as the terminal has; the first begins with `first`, the others with `rest`.
+/// Wraps a text at [`WIDTH`] characters, or at the width of a narrower terminal. The first line begins with `first`, the others with
+/// `rest`.
 pub(crate) fn wrapped(first: &str, text: &str, rest: &str) -> String {
-    wrapped_to(WIDTH.min(columns()), [first, text, rest])
+    wrapped_to(WIDTH.min(columns()), first, text, rest)
 }
 
-/// Text in lines of `width` characters, as by [`wrapped`].
-pub(crate) fn wrapped_to(width: usize, [first, text, rest]: [&str; 3]) -> String {
+/// Wraps a text at `width` characters. The first line begins with `first`, the others with `rest`.
+pub(crate) fn wrapped_to(width: usize, first: &str, text: &str, rest: &str) -> String {
     let mut lines = String::new();
     let mut line = first.to_owned();
     let mut is_empty = true;

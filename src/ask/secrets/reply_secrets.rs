@@ -29,7 +29,7 @@ pub(in crate::ask) fn without_secrets(reply: Reply, scrub: &Scrub) -> Reply {
             Finish::Other(reason) => Finish::Other(scrub.line(&reason)),
             finish => finish,
         }
-        .shortened(),
+        .shorten(),
         chances: reply.chances.map(|chances| map_tokens(chances, name)),
         ..reply
     }

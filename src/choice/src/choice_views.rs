@@ -1,4 +1,4 @@
-//! The choices of a question as they occur in plain text: [`ChoiceViews`].
+//! [`ChoiceViews`]: the choices of a question, prepared for search in plain text.
 
 use std::collections::HashMap;
 
@@ -9,21 +9,21 @@ use darkqa_ground::types::questions::Choices;
 /// Kind of thing that a choice names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Naming {
-    /// A thing or a room. "Table lamp" is no table.
+    /// A thing or a room. "Table lamp" does not name a table.
     Thing,
-    /// A place, a number, yes or no, which stands before a noun: "on the left side".
+    /// A place, a number, yes or no. A noun may follow: "on the left side".
     Attribute,
-    /// A color or a brightness, which may be the image's own.
+    /// A color or a brightness, which may describe the image.
     Color,
 }
 
-/// The choices as they occur in plain text.
+/// The choices of a question in the forms in which a reply may contain them.
 pub(super) struct ChoiceViews {
     /// Texts of the choices without markup.
     pub(super) texts: Vec<String>,
     /// The same texts in lower case without a final period, longest first, each with the index of its choice.
     pub(super) folded: Vec<(String, usize)>,
-    /// The choices of letters and blanks alone, by their letters without blanks.
+    /// Indices of the choices that consist of letters and spaces, by their letters without spaces.
     pub(super) joined: HashMap<String, Vec<usize>>,
     /// Kind of thing that each choice names.
     pub(super) naming: Vec<Naming>,
@@ -31,7 +31,7 @@ pub(super) struct ChoiceViews {
     pub(super) yes_no: Option<(usize, usize)>,
 }
 
-/// Minimum number of letters of a choice that is also compared without blanks.
+/// Minimum length in bytes of a choice that is also compared without spaces.
 const MIN_JOINED: usize = 6;
 
 impl ChoiceViews {
@@ -47,15 +47,15 @@ impl ChoiceViews {
             .enumerate()
             .map(|(index, text)| (text, index))
             .collect();
-        let naming = folded.iter().map(|(text, _)| naming(text)).collect();
+        let naming = folded.iter().map(|(text, _)| classify(text)).collect();
         folded.retain(|(text, _)| !text.is_empty());
-        let position = |word: &str| {
+        let [yes, no] = ["yes", "no"].map(|word| {
             folded
                 .iter()
                 .find(|(text, _)| text == word)
                 .map(|(_, index)| *index)
-        };
-        let yes_no = position("yes").zip(position("no"));
+        });
+        let yes_no = yes.zip(no);
         let mut joined = HashMap::<String, Vec<usize>>::new();
         for (text, index) in &folded {
             let letters: String = text.split(' ').collect();
@@ -74,16 +74,21 @@ impl ChoiceViews {
     }
 }
 
-/// Classifies a choice by its words: an attribute or a color if it has only words of that class, else a thing.
-fn naming(folded: &str) -> Naming {
+/// Classifies a choice by its words: a color or an attribute if it has only words of that class, otherwise a thing.
+fn classify(folded: &str) -> Naming {
     let words = Clauses::new(folded, &tokens(folded)).elements;
-    let all = |kinds: &[Role]| words.iter().all(|word| word.roles.has_any(kinds));
+    let is_color = words
+        .iter()
+        .all(|word| word.roles.has_any(&[Role::Color, Role::Shade]));
+    let is_place = words
+        .iter()
+        .all(|word| word.roles.has_any(&[Role::Place, Role::Number]));
     let is_number = words
         .iter()
         .all(|word| word.slice(folded).chars().all(char::is_numeric));
-    if !words.is_empty() && all(&[Role::Color, Role::Shade]) {
+    if !words.is_empty() && is_color {
         Naming::Color
-    } else if is_number || all(&[Role::Place, Role::Number]) || matches!(folded, "yes" | "no") {
+    } else if is_number || is_place || matches!(folded, "yes" | "no") {
         Naming::Attribute
     } else {
         Naming::Thing

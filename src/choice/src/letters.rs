@@ -1,10 +1,10 @@
-//! Letters in a reply that name a choice.
+//! [`letters`]: the letters in a reply that name a choice.
 
 use std::sync::LazyLock;
 
 use regex::Regex;
 
-use super::names::{Delimiting, Name, NameState, continues_word, index_of, unspaced};
+use super::names::{Delimiting, Name, NameState, continues_word, index_of_letter, is_unspaced};
 use super::text::clean::compiled;
 use super::text::words::Role;
 use super::text::{Clauses, RANGE};
@@ -25,11 +25,11 @@ pub(super) static AFTER_I: LazyLock<Regex> =
 pub(super) fn letters(text: &str, choices: usize, clauses: &Clauses<'_>) -> Vec<Name> {
     text.bytes()
         .enumerate()
-        .filter(|(at, byte)| byte.is_ascii_alphabetic() && !is_inside(text.as_bytes(), *at))
+        .filter(|(at, byte)| byte.is_ascii_alphabetic() && !has_neighbour(text.as_bytes(), *at))
         .filter_map(|(start, byte)| {
             let letter = char::from(byte);
             let delimiting = delimiting(text, start, letter, clauses)?;
-            let choice = index_of(letter).filter(|index| *index < choices);
+            let choice = index_of_letter(letter).filter(|index| *index < choices);
             (choice.is_some() || delimiting == Delimiting::Firm).then_some(Name {
                 start,
                 end: start + 1,
@@ -41,13 +41,16 @@ pub(super) fn letters(text: &str, choices: usize, clauses: &Clauses<'_>) -> Vec<
         .collect()
 }
 
-/// Whether a letter has another one beside it.
-fn is_inside(text: &[u8], at: usize) -> bool {
-    let is_letter = |byte: Option<&u8>| byte.is_some_and(u8::is_ascii_alphanumeric);
-    is_letter(text.get(at + 1)) || (at > 0 && is_letter(text.get(at - 1)))
+/// True if an ASCII letter or digit is next to the letter.
+fn has_neighbour(text: &[u8], at: usize) -> bool {
+    [at.checked_sub(1), Some(at + 1)]
+        .into_iter()
+        .flatten()
+        .filter_map(|next| text.get(next))
+        .any(u8::is_ascii_alphanumeric)
 }
 
-/// How clearly the letter at byte `start` is delimited as a choice; `None` for a part of a word, an article or a pronoun.
+/// Delimiting of the letter at byte `start`; `None` for a part of a word, an article or a pronoun.
 fn delimiting(text: &str, start: usize, letter: char, clauses: &Clauses<'_>) -> Option<Delimiting> {
     let (left, right) = (&text[..start], &text[start + 1..]);
     let (before, after) = (left.chars().next_back(), right.chars().next());
@@ -58,40 +61,40 @@ fn delimiting(text: &str, start: usize, letter: char, clauses: &Clauses<'_>) -> 
     {
         return None;
     }
-    if hyphenated(left, right) || abbreviated(left, right) {
+    if is_hyphenated(left, right) || is_abbreviated(left, right) {
         return None;
     }
     if matches!(before, Some('(' | '[')) && matches!(after, Some(')' | ']')) {
         return Some(Delimiting::Firm);
     }
-    let leading = start == 0 || left == "(" || left == "[";
-    let label = matches!(after, Some('.' | ')' | ':' | ']'));
+    let is_leading = start == 0 || left == "(" || left == "[";
+    let is_label = matches!(after, Some('.' | ')' | ':' | ']'));
     if letter.is_ascii_lowercase() {
-        return (leading && label).then_some(Delimiting::Firm);
+        return (is_leading && is_label).then_some(Delimiting::Firm);
     }
     let words = right.trim_start_matches(' ');
     let ends = words.is_empty() || words.starts_with(['\n', '-', '–', '—']);
-    let marked = after.is_some_and(|c| ".):,;!?]}、。，：；/&=".contains(c))
+    let is_marked = after.is_some_and(|c| ".):,;!?]}、。，：；/&=".contains(c))
         && !(letter == 'I' && after == Some(','));
-    let bracket = matches!(before, Some('(' | '['));
-    let name = match letter {
-        _ if called_letter(left) || after.is_some_and(unspaced) => true,
+    let is_bracketed = matches!(before, Some('(' | '['));
+    let is_name = match letter {
+        _ if is_called_letter(left) || after.is_some_and(is_unspaced) => true,
         'A' | 'I' | 'E' | 'O' | 'Y' | 'U' if joined_to_letter(clauses, start + 1) => true,
         'A' => AFTER_A.is_match(words),
         'I' => AFTER_I.is_match(words),
         // One-letter words of other languages: "E", "O", "Y", "U", "W", "Z".
-        'E' | 'O' | 'Y' | 'U' | 'W' | 'Z' => !leading || AFTER_A.is_match(words),
+        'E' | 'O' | 'Y' | 'U' | 'W' | 'Z' => !is_leading || AFTER_A.is_match(words),
         _ => true,
     };
-    match (ends || marked || bracket, name) {
+    match (ends || is_marked || is_bracketed, is_name) {
         (false, false) => None,
-        _ if leading => Some(Delimiting::Firm),
+        _ if is_leading => Some(Delimiting::Firm),
         (true, _) => Some(Delimiting::Plain),
         (false, true) => Some(Delimiting::Loose),
     }
 }
 
-/// Whether an alternative letter follows a byte: "A ou C", "A oder B".
+/// True if another letter follows as an alternative: "A ou C", "A oder B".
 fn joined_to_letter(clauses: &Clauses<'_>, end: usize) -> bool {
     let or = clauses.index(end);
     let other = clauses.elements.get(or + 1);
@@ -102,16 +105,18 @@ fn joined_to_letter(clauses: &Clauses<'_>, end: usize) -> bool {
         && other.is_some_and(|other| other.slice(clauses.folded).len() == 1)
 }
 
-/// Whether a letter is part of a hyphenated word: "T-shirt", "Plan-B".
-pub(super) fn hyphenated(left: &str, right: &str) -> bool {
-    let dash = |c: Option<char>| matches!(c, Some('-' | '‐' | '‑' | RANGE));
+/// True if a letter is part of a hyphenated word: "T-shirt", "Plan-B".
+pub(super) fn is_hyphenated(left: &str, right: &str) -> bool {
     let (mut before, mut after) = (left.chars().rev(), right.chars());
-    (dash(before.next()) && continues_word(before.next()))
-        || (dash(after.next()) && continues_word(after.next()))
+    [(before.next(), before.next()), (after.next(), after.next())]
+        .into_iter()
+        .any(|(dash, letter)| {
+            matches!(dash, Some('-' | '‐' | '‑' | RANGE)) && continues_word(letter)
+        })
 }
 
 /// True if the words before a letter mark it as a choice: "option A".
-pub(super) fn called_letter(left: &str) -> bool {
+pub(super) fn is_called_letter(left: &str) -> bool {
     const WORDS: [&str; 8] = [
         "option",
         "choice",
@@ -130,8 +135,8 @@ pub(super) fn called_letter(left: &str) -> bool {
     word.len() <= WORDS[7].len() && WORDS.contains(&word.to_lowercase().as_str())
 }
 
-/// Whether a letter is part of an abbreviation: "U.S.", "e.g.", "N/A".
-pub(super) fn abbreviated(left: &str, right: &str) -> bool {
+/// True if a letter is part of an abbreviation: "U.S.", "e.g.", "N/A".
+pub(super) fn is_abbreviated(left: &str, right: &str) -> bool {
     let mut before = left.chars().rev();
     let mut after = right.chars();
     let preceded = before.next() == Some('.')

@@ -1,15 +1,15 @@
-//! Reading of the choice in a reply, by exact match: [`read`] and [`readings`].
+//! Parsing of the choice in a model's reply: [`read`] and [`readings`].
 //!
-//! Two readings are always reported together. [`ReadingMode::Strict`] accepts a reply that is an answer and nothing else.
+//! Two parsings are always reported together. [`ReadingMode::Strict`] accepts a reply that is an answer and nothing else.
 //! [`ReadingMode::Lenient`] also finds an answer inside a reply; if two choices are possible, it accepts neither. No choice
 //! is ever guessed. If the strict parsing finds a choice, the lenient parsing finds the same.
 //!
-//! A reply passes through `clean` (which removes hidden reasoning, invisible characters and leaked tokens), then `strict`,
-//! then the steps of `lenient`, in the order of its functions `steps` and `read_plain`.
+//! A reply passes through `clean` (which removes hidden reasoning, invisible characters and leaked tokens), then `strict`, then the
+//! levels of `lenient`.
 
 #![allow(
     missing_docs,
-    reason = "fields and variants of this workspace's own use, whose names say what they are"
+    reason = "fields and variants for use within this workspace, with descriptive names"
 )]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test may panic"))]
 
@@ -17,7 +17,7 @@ mod choice_views;
 mod letters;
 pub mod llm_match;
 mod markers;
-mod named;
+mod name_index;
 mod names;
 pub mod option_probabilities;
 mod rules;
@@ -36,22 +36,23 @@ use darkqa_ground::types::replies::{Finish, Reply};
 use rules::{lenient, strict};
 use text::clean;
 
-/// The version of the lenient parsing, raised whenever any reply may read differently. Records of another version are read again by
-/// `report --rescore`. The strict parsing changed with `lenient/4` alone: marks of reasoning, and full-width signs around letters.
+/// The version of the lenient parsing, raised whenever the result of any reply may change. `report --rescore` parses the replies of
+/// records of another version again. The strict parsing changed only with `lenient/4`: marks of reasoning, and full-width signs around
+/// letters.
 pub const LENIENT_VERSION: &str = "lenient/4";
 
-/// How much text a reply may have around the answer.
+/// The parsing of a reply: how much text may surround the answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ReadingMode {
-    /// None: the whole reply is a choice's text, its letter, or its letter with its text. Headline numbers use this reading.
+    /// No other text: the reply is a choice's text, its letter, or its letter with its text. Headline numbers use this parsing.
     Strict,
-    /// Sentences, markup, JSON or LaTeX, if exactly one choice is meant.
+    /// Sentences, markup, JSON or LaTeX around exactly one choice.
     Lenient,
 }
 
 impl ReadingMode {
-    /// Both readings, the headline reading first.
+    /// Both parsings, the one of headline numbers first.
     pub const ALL: [Self; 2] = [Self::Strict, Self::Lenient];
 
     /// The word in files.
@@ -66,8 +67,8 @@ impl ReadingMode {
 
 /// The choice in a reply, as an index in the order shown, or the reason why none could be read.
 ///
-/// Text in a closed reasoning block, by the marks of `reasoning.toml`, is ignored. A block that is opened and never closed leaves
-/// nothing to read: the reason is then [`UnreadReason::Truncated`].
+/// Text in a closed reasoning block, by the marks of `reasoning.toml`, is ignored. If a block is not closed, the result is
+/// [`UnreadReason::Truncated`].
 ///
 /// ```
 /// use darkqa_choice::{ReadingMode, read};
@@ -88,7 +89,7 @@ pub fn read(reply: &str, choices: &Choices, mode: ReadingMode) -> Answer {
     if let Some(answer) = strict::read(text, choices.texts()) {
         return answer;
     }
-    if let Some(rest) = clean::behind_channel(text) {
+    if let Some(rest) = clean::after_channel_name(text) {
         let unread = Answer::Unparsed(UnreadReason::Truncated);
         return strict::read(rest, choices.texts()).unwrap_or(unread);
     }
@@ -98,11 +99,10 @@ pub fn read(reply: &str, choices: &Choices, mode: ReadingMode) -> Answer {
     }
 }
 
-/// The strict and the lenient parsing of a reply, in this order, considering how the reply ended.
+/// The strict and the lenient parsing of a reply, in this order. Unlike [`read`], it considers how the reply ended.
 ///
-/// The exact words of a choice count in any case. Otherwise a separate refusal, a content filter and the token limit
-/// decide, in this order. A truncated explanation is not read leniently, because it could still have ended in another
-/// choice.
+/// A choice that the strict parsing finds always counts. Otherwise a separate refusal, a content filter and the token limit decide, in
+/// this order. A truncated explanation is not parsed leniently, because it could still have ended in another choice.
 #[must_use]
 pub fn readings(reply: &Reply, choices: &Choices) -> (Answer, Answer) {
     let strict = read(&reply.text, choices, ReadingMode::Strict);

@@ -1,11 +1,11 @@
-//! LLM-Match, OpenEQA's score of open answers by a judge model (Majumdar et al. 2024, CVPR, section 4): preparation of an
-//! answer, reading of a mark, and points of a mark. It follows `facebookresearch/open-eqa` at cfa3fce.
+//! LLM-Match, OpenEQA's score of open answers by a judge model (Majumdar et al. 2024, CVPR, section 4): truncation of an answer,
+//! parsing of a mark, and points of a mark. It follows `facebookresearch/open-eqa` at cfa3fce.
 
 use clap::ValueEnum;
 
 use darkqa_ground::types::flags::flag_words;
 
-/// The rules by which answers are judged and a judge's reply is read.
+/// Rules for preparing answers and parsing a judge's reply.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Protocol {
     /// Text after the last full stop of an answer is cut off; marks are read exactly as by upstream's `parse_score`.
@@ -16,20 +16,20 @@ pub enum Protocol {
 
 flag_words!(Protocol);
 
-/// An answer as upstream judges it: text after the last full stop is cut off (`evaluate-predictions.py`).
+/// Cuts off the text after the last full stop of an answer, as upstream does (`evaluate-predictions.py`).
 ///
 /// The rule is meant for sentences that were truncated at the token limit; it also turns "about 1.5 meters" into "about 1.".
 /// An answer without a full stop, or with nothing after it, stays whole.
 #[must_use]
-pub fn shortened(answer: &str) -> &str {
+pub fn truncate_answer(answer: &str) -> &str {
     match answer.rfind('.') {
         Some(at) if at + 1 < answer.len() => &answer[..=at],
         _ => answer,
     }
 }
 
-/// The mark in a judge's reply; `None` if there is none. The upstream reading accepts any integer, which [`points`] clips to
-/// 1 to 5. The tolerant protocol also reads what that leaves, and there accepts only 1 to 5.
+/// Parses the mark in a judge's reply; `None` without a mark. The upstream rules accept any integer, which [`points`] clips to 1 to 5.
+/// The tolerant protocol parses other replies as well, and there accepts only 1 to 5.
 #[must_use]
 pub fn mark(reply: &str, protocol: Protocol) -> Option<i64> {
     upstream(reply).or_else(|| match protocol {
@@ -38,7 +38,7 @@ pub fn mark(reply: &str, protocol: Protocol) -> Option<i64> {
     })
 }
 
-/// Upstream's reading: `output.isdigit()`, else the rest of the line after the first "Your mark:".
+/// Upstream's rules: `output.isdigit()`, else the rest of the line after the first "Your mark:".
 fn upstream(reply: &str) -> Option<i64> {
     const CUE: &str = "Your mark:";
     if !reply.is_empty() && reply.bytes().all(|byte| byte.is_ascii_digit()) {
@@ -49,14 +49,13 @@ fn upstream(reply: &str) -> Option<i64> {
     line.trim().parse().ok()
 }
 
-/// The tolerant reading: one digit from 1 to 5, alone or after a cue word, with punctuation or emphasis around it.
+/// The tolerant rules: one digit from 1 to 5, alone or after a cue word, with punctuation or emphasis around it.
 fn tolerant(reply: &str) -> Option<i64> {
     let lower = reply.to_lowercase();
     let after_cue = ["your mark", "mark", "score", "rating"]
         .iter()
         .find_map(|cue| Some(&lower[lower.rfind(cue)? + cue.len()..]))
         .unwrap_or(&lower);
-    let is_decoration = |c: char| c.is_whitespace() || "*_`:=\"'().[]".contains(c);
     let digits = after_cue.trim_matches(is_decoration);
     let digits = digits
         .strip_prefix("is ")
@@ -73,6 +72,10 @@ fn tolerant(reply: &str) -> Option<i64> {
     }
 }
 
+fn is_decoration(c: char) -> bool {
+    c.is_whitespace() || "*_`:=\"'().[]".contains(c)
+}
+
 /// Points of one item, between 0 and 1: (clip(mark, 1, 5) − 1) / 4. A null answer (`None`) has 0 points without a judge.
 #[must_use]
 pub fn points(mark: Option<i64>) -> f64 {
@@ -84,7 +87,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn answers_are_cut_as_upstream_cuts_them() {
+    fn answers_are_truncated_as_upstream() {
         for (answer, judged) in [
             ("The door is open. It also", "The door is open."),
             ("about 1.5 meters", "about 1."),
@@ -94,7 +97,7 @@ mod tests {
             ("", ""),
             ("Größe. ü", "Größe."),
         ] {
-            assert_eq!(shortened(answer), judged, "{answer:?}");
+            assert_eq!(truncate_answer(answer), judged, "{answer:?}");
         }
     }
 
@@ -127,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn points_are_upstreams() {
+    fn points_match_upstream() {
         let marks = [Some(5), Some(5), Some(3), Some(1), None];
         let score = 100.0 * marks.into_iter().map(points).sum::<f64>() / 5.0;
         assert!((score - 50.0).abs() < 1e-12);

@@ -1,4 +1,4 @@
-//! The words that announce an answer, in the languages that models reply in.
+//! Words that announce an answer, in many languages: [`markers`], [`lead`].
 //!
 //! The nouns include those of the multilingual patterns of OpenAI's simple-evals (`MULTILINGUAL_ANSWER_REGEXES`).
 
@@ -10,7 +10,7 @@ use super::text::Clauses;
 use super::text::clean::compiled;
 use super::text::words::Role;
 
-/// How strongly a marker announces an answer.
+/// The meaning of a marker for the choice that follows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum MarkerKind {
     /// "answer", "correct option": the choice that follows is the answer.
@@ -19,7 +19,7 @@ pub(super) enum MarkerKind {
     Decision,
     /// "option", "letter": a choice is mentioned, perhaps not as the answer.
     Mention,
-    /// "Which leaves": what follows is the answer.
+    /// "which leaves": the choice that follows is the answer.
     Remainder,
 }
 
@@ -92,7 +92,7 @@ static ARTICLE: LazyLock<Regex> = LazyLock::new(|| {
 });
 
 /// Number of bytes of articles and opening words at the beginning of a text.
-pub(super) fn article(folded: &str) -> usize {
+pub(super) fn article_length(folded: &str) -> usize {
     ARTICLE.find(folded).map_or(0, |found| found.end())
 }
 
@@ -101,40 +101,40 @@ pub(super) fn article(folded: &str) -> usize {
 pub(super) struct Lead {
     /// Bytes at which the announced name may begin, in increasing order.
     pub(super) steps: Vec<usize>,
-    /// Whether there is a verb or a colon, so that the name is stated to be the answer.
-    pub(super) linked: bool,
-    /// Whether there is a colon, so that all the rest is the answer.
-    pub(super) colon: bool,
+    /// True if the lead contains a verb or a colon, so that the name is stated to be the answer.
+    pub(super) is_linked: bool,
+    /// True if the lead contains a colon, so that all text after it is the answer.
+    pub(super) has_colon: bool,
 }
 
 /// Maximum number of words between a marker and a name.
 const MAX_LEAD_WORDS: usize = 12;
 
-/// The lead after a marker that ends at byte `end`. A denial in it is passed: it shows in the state of the name.
+/// The lead after a marker that ends at byte `end`. Denials in it are skipped, because the state of the name contains them.
 pub(super) fn lead(clauses: &Clauses<'_>, end: usize) -> Lead {
     let folded = clauses.folded;
     let mut lead = Lead {
         steps: vec![past_space(folded, end)],
-        linked: false,
-        colon: false,
+        is_linked: false,
+        has_colon: false,
     };
     let mut at = end;
     for _ in 0..MAX_LEAD_WORDS {
         let denial = clauses
-            .from(at)
+            .element_at(at)
             .filter(|word| word.roles.has_any(&[Role::Not, Role::Exclude]));
         if let Some(denial) = denial {
             at = denial.end;
-            lead.linked = true;
+            lead.is_linked = true;
             lead.steps.push(past_space(folded, at));
             continue;
         }
         let Some(found) = LEAD.captures(&folded[at..]) else {
             break;
         };
-        let has = |name: &str| found.name(name).is_some();
-        lead.colon |= has("colon");
-        lead.linked |= has("link") || has("colon");
+        let has_colon = found.name("colon").is_some();
+        lead.has_colon |= has_colon;
+        lead.is_linked |= has_colon || found.name("link").is_some();
         at += found.get(0).map_or(0, |whole| whole.end());
         lead.steps.push(past_space(folded, at));
     }
@@ -163,12 +163,12 @@ static LETTER_CONFIRMATION: LazyLock<Regex> = LazyLock::new(|| {
     ))
 });
 
-/// Whether the text after a letter calls it the answer: "B is correct".
+/// True if the text after a letter calls it the answer: "B is correct".
 pub(super) fn confirms_letter(after: &str) -> bool {
     CONFIRMATION.is_match(after) || LETTER_CONFIRMATION.is_match(after)
 }
 
-/// Whether the text after a choice's text calls it the answer: "kitchen is the best answer".
+/// True if the text after a choice's text calls it the answer: "kitchen is the best answer".
 pub(super) fn confirms_text(after: &str) -> bool {
     CONFIRMATION.is_match(after)
 }

@@ -1,62 +1,71 @@
-//! How likely a model held each choice, from the likeliest tokens of its reply: [`option_probabilities`].
+//! The probability of each choice, from the token probabilities of a reply: [`option_probabilities`].
 
 use std::ops::Range;
 
 use darkqa_ground::types::questions::letter;
 use darkqa_ground::types::{OptionProbabilities, Thought, TokenChances, TokenPosition};
 
-/// The number of tokens among which the first one of the answer is looked for; chosen.
+/// The answer must begin within this many tokens; chosen.
 const FIRST_TOKENS: usize = 8;
 
-/// The least probability of all tokens that name a choice; chosen. With less, the model did not begin with a choice.
-const LEAST_MASS: f64 = 0.5;
+/// Minimum total probability of the tokens that name a choice; chosen. Below it, the model did not begin with a choice.
+const MIN_MASS: f64 = 0.5;
 
-/// Numbers are kept to this many decimals.
-const DECIMALS: f64 = 1e6;
+/// Probabilities are rounded to multiples of its inverse, six decimals.
+const SCALE: f64 = 1e6;
 
-/// The longest token that is kept, in characters.
-const LONGEST: usize = 40;
+/// Maximum length of a stored token, in characters.
+const MAX_TOKEN_CHARS: usize = 40;
 
 /// The probabilities of these choices in the order shown; `None` if the reply does not begin with one.
 ///
-/// The tokens are those at the first position that is more than white space, brackets, marks or the word “Answer”; in a JSON object,
-/// those of its value. Tokens count for the choice of their letter, without regard to case, spaces and brackets (“ B”, “(b”); if they name
-/// no letters, for the choice whose text alone begins with them. Their probabilities are scaled to 1.
+/// The tokens are taken from the first position that is more than white space, brackets, punctuation or the word “Answer”; in a JSON
+/// object, from the start of its value. A token counts for the choice of its letter, ignoring case, spaces and brackets (“ B”, “(b”). If
+/// tokens of letters have too little probability, a token counts for the only choice whose text begins with it. The probabilities are
+/// scaled to a sum of 1.
 pub fn option_probabilities(
     chances: &TokenChances,
     choices: &[String],
 ) -> Option<OptionProbabilities> {
     let position = &chances.positions[answer_position(&chances.positions)?];
-    let by = |option: &dyn Fn(&str) -> Option<usize>| masses(position, choices.len(), option);
-    let letters = by(&|token| choice_by_letter(token, choices.len()));
-    let masses = if letters.iter().sum::<f64>() >= LEAST_MASS {
+    let letters = masses(position, choices.len(), |token| {
+        choice_by_letter(token, choices.len())
+    });
+    let masses = if letters.iter().sum::<f64>() >= MIN_MASS {
         letters
     } else {
-        by(&|token| choice_by_text(token, choices))
+        masses(position, choices.len(), |token| {
+            choice_by_text(token, choices)
+        })
     };
     let mass: f64 = masses.iter().sum();
-    if mass < LEAST_MASS {
+    if mass < MIN_MASS {
         return None;
     }
-    let rounded = |value: f64| (value * DECIMALS).round() / DECIMALS;
     Some(OptionProbabilities {
-        p: masses.iter().map(|own| rounded(own / mass)).collect(),
-        mass: rounded(mass),
-        bound: rounded(bound(position)),
-        token: position.token.chars().take(LONGEST).collect(),
+        p: masses.iter().map(|own| round(own / mass)).collect(),
+        mass: round(mass),
+        bound: round(bound(position)),
+        token: position.token.chars().take(MAX_TOKEN_CHARS).collect(),
         reasoned: chances.thought == Thought::Before,
     })
 }
 
-/// The index of the position at which the answer stands; `None` if the reply has none there.
+fn round(value: f64) -> f64 {
+    (value * SCALE).round() / SCALE
+}
+
+/// The index of the position at which the answer begins; `None` if the reply does not begin with an answer.
 fn answer_position(positions: &[TokenPosition]) -> Option<usize> {
-    let first = positions.iter().position(|at| !is_before_answer(&at.token));
-    let first = first.filter(|index| *index < FIRST_TOKENS);
+    let first = positions
+        .iter()
+        .position(|at| !is_before_answer(&at.token))
+        .filter(|index| *index < FIRST_TOKENS);
     let whole: String = positions.iter().map(|at| at.token.as_str()).collect();
     if !whole.trim_start().starts_with('{') {
         return first;
     }
-    let value = value_in(&whole)?;
+    let value = answer_value(&whole)?;
     positions
         .iter()
         .scan(0, |end, at| {
@@ -68,50 +77,50 @@ fn answer_position(positions: &[TokenPosition]) -> Option<usize> {
         .map(|(index, _)| index)
 }
 
-/// The place of the value of `"answer"` in the beginning of a JSON object, without its quotation mark.
-fn value_in(object: &str) -> Option<Range<usize>> {
+/// The byte range of the value of `"answer"` in the beginning of a JSON object, without the opening quotation mark.
+fn answer_value(object: &str) -> Option<Range<usize>> {
     const FIELD: &str = "\"answer\"";
     let field = object.find(FIELD)? + FIELD.len();
-    let behind = object.get(field..)?;
-    let start = behind.find(|c: char| !c.is_whitespace() && c != ':' && c != '"')?;
+    let after = object.get(field..)?;
+    let start = after.find(|c: char| !c.is_whitespace() && c != ':' && c != '"')?;
     Some(field + start..object.len())
 }
 
-/// Whether a token stands before an answer: nothing but white space and marks, or the word “Answer”.
+/// True for a token that may precede an answer: only white space and punctuation, or the word “Answer”.
 fn is_before_answer(token: &str) -> bool {
     let bare = bare(token);
     bare.is_empty() || bare == "answer" || bare == "answer:"
 }
 
-/// A token in small letters without the marks of tokenizers for a space (`Ġ` of byte-level BPE, `▁` of SentencePiece), white space,
-/// brackets, quotation marks and punctuation around it.
+/// A token in lower case, without surrounding white space, brackets, quotation marks, punctuation and tokenizer marks for a space (`Ġ`
+/// of byte-level BPE, `▁` of SentencePiece).
 fn bare(token: &str) -> String {
     const AROUND: &str = "\"'`“”‘’*#([{<.:,)]}>\u{120}\u{2581}\u{10a}";
-    let inner = token.trim_matches(|c: char| c.is_whitespace() || AROUND.contains(c));
-    inner.to_lowercase()
+    token
+        .trim_matches(|c: char| c.is_whitespace() || AROUND.contains(c))
+        .to_lowercase()
 }
 
-/// The choice of a letter.
+/// The choice whose letter is the token.
 fn choice_by_letter(token: &str, choices: usize) -> Option<usize> {
     (0..choices).find(|index| letter(*index).to_lowercase().eq(token.chars()))
 }
 
-/// The choice whose text alone begins with a token; one letter is too little, unless it is the whole text.
+/// The only choice whose text begins with the token. A token of one letter must be the whole text.
 fn choice_by_text(token: &str, choices: &[String]) -> Option<usize> {
-    let begins = |text: &&String| {
+    let mut named = choices.iter().enumerate().filter(|(_, text)| {
         let text = text.to_lowercase();
         text == token || (token.chars().count() > 1 && text.starts_with(token))
-    };
-    let mut named = choices.iter().enumerate().filter(|(_, text)| begins(text));
+    });
     let (index, _) = named.next()?;
     named.next().is_none().then_some(index)
 }
 
-/// The probabilities of the tokens of each choice, added up.
+/// The sum of the token probabilities for each choice; `option` returns the choice of a token.
 fn masses(
     position: &TokenPosition,
     choices: usize,
-    option: &dyn Fn(&str) -> Option<usize>,
+    option: impl Fn(&str) -> Option<usize>,
 ) -> Vec<f64> {
     let mut masses = vec![0.0; choices];
     for (token, logprob) in &position.likeliest {
@@ -122,7 +131,8 @@ fn masses(
     masses
 }
 
-/// Upper bound for the probability of an unlisted token: that of the least likely listed one, and at most the rest to 1.
+/// Upper bound for the probability of an unlisted token: the probability of the least likely listed token, and at most 1 minus the sum of
+/// the listed ones.
 fn bound(position: &TokenPosition) -> f64 {
     let listed = position
         .likeliest
@@ -138,10 +148,10 @@ mod tests {
     use super::*;
 
     fn at(token: &str, likeliest: &[(&str, f64)]) -> TokenPosition {
-        let likeliest = likeliest.iter();
         TokenPosition {
             token: token.to_owned(),
             likeliest: likeliest
+                .iter()
                 .map(|(token, logprob)| ((*token).to_owned(), *logprob))
                 .collect(),
         }
@@ -190,15 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn the_position_is_the_first_of_the_answer() {
-        let sure = [("B", -0.01), ("A", -5.0)];
-        let marks = |tokens: &[&str]| -> Vec<TokenPosition> {
-            tokens
-                .iter()
-                .map(|token| at(token, &[(*token, 0.0)]))
-                .chain([at("B", &sure)])
-                .collect()
-        };
+    fn answer_may_follow_marks() {
         for before in [
             &[][..],
             &["\n", "**", "("],
@@ -207,7 +209,7 @@ mod tests {
             &["{\"", "answer", "\":", " \""],
             &["{", "\n", "  ", "\"answer\"", ": ", "\""],
         ] {
-            let options = read(&marks(before), &FOUR);
+            let options = read(&with_answer(before), &FOUR);
             assert!(options.is_some_and(|o| o.p[1] > 0.9), "{before:?}");
         }
         // A quotation mark may be in the token of the letter.
@@ -215,10 +217,19 @@ mod tests {
         assert!(read(&quoted, &FOUR).is_some());
         // Replies that do not begin with a choice have no probabilities of choices.
         for before in [&["The", " answer", " is"][..], &[" "; 8]] {
-            assert_eq!(read(&marks(before), &FOUR), None, "{before:?}");
+            assert_eq!(read(&with_answer(before), &FOUR), None, "{before:?}");
         }
         assert_eq!(read(&[], &FOUR), None);
         assert_eq!(read(&[at("{\"", &[]), at("why", &[])], &FOUR), None);
+    }
+
+    /// Positions with these tokens, then one with the answer B.
+    fn with_answer(tokens: &[&str]) -> Vec<TokenPosition> {
+        tokens
+            .iter()
+            .map(|token| at(token, &[(*token, 0.0)]))
+            .chain([at("B", &[("B", -0.01), ("A", -5.0)])])
+            .collect()
     }
 
     #[test]
@@ -257,8 +268,9 @@ mod tests {
 
     #[test]
     fn half_of_the_probability_must_name_a_choice() {
-        let position = |logprob: f64| at("A", &[("A", logprob), ("I", -0.7)]);
-        assert!(read(&[position(-0.69)], &FOUR).is_some());
-        assert_eq!(read(&[position(-0.70)], &FOUR), None);
+        let [enough, too_little] =
+            [-0.69, -0.70].map(|logprob| at("A", &[("A", logprob), ("I", -0.7)]));
+        assert!(read(&[enough], &FOUR).is_some());
+        assert_eq!(read(&[too_little], &FOUR), None);
     }
 }

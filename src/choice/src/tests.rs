@@ -1,4 +1,4 @@
-//! Every rule of reading, on a table of replies, and properties that hold for any reply.
+//! Tests of the parsing rules on a table of replies, and of properties that hold for any reply.
 
 #![allow(clippy::unwrap_used)]
 
@@ -81,7 +81,7 @@ fn table_of_replies() -> Vec<String> {
 }
 
 #[test]
-fn the_table_of_replies_is_read() {
+fn replies_of_the_table_are_parsed() {
     let mut wrong = Vec::new();
     for line in include_str!("../../../tests/data/replies.jsonl").lines() {
         let case: Case = serde_json::from_str(line).unwrap();
@@ -103,9 +103,9 @@ fn the_table_of_replies_is_read() {
     );
 }
 
-/// Text inside the marks of reasoning never gives the answer; text behind them is read strictly.
+/// Text inside reasoning marks is ignored; text after them is parsed strictly.
 #[test]
-fn marks_of_reasoning_are_those_of_the_table() {
+fn reasoning_blocks_are_ignored() {
     let rooms = choices_of(&["kitchen", "bedroom", "bathroom"]);
     for (begin, end) in [
         ("<think>", "</think>"),
@@ -135,9 +135,9 @@ fn marks_of_reasoning_are_those_of_the_table() {
     }
 }
 
-/// A server that drops special tokens leaves the name of Gemma's channel; where the reasoning ends is not known then.
+/// A server that drops special tokens leaves the name of Gemma's reasoning channel. The end of the reasoning is then unknown.
 #[test]
-fn reasoning_without_its_marks_gives_no_answer() {
+fn reasoning_without_marks_is_not_parsed() {
     let rooms = choices_of(&["kitchen", "bedroom", "bathroom"]);
     let reply = "thought\nThe image is dark. The answer is C at first sight, hmm.\nB";
     for mode in ReadingMode::ALL {
@@ -162,50 +162,66 @@ fn full_width_letters_are_read_strictly() {
 }
 
 #[test]
-fn the_end_of_a_reply_is_considered() {
+fn finish_and_refusal_are_considered() {
     let rooms = choices("rooms");
-    let reply = |text: &str, finish: Finish, refusal: Option<&str>| Reply {
-        finish,
-        refusal: refusal.map(str::to_owned),
-        ..Reply::local(text.to_owned())
-    };
-    let both = |answer: Answer| (answer, answer);
-    let unparsed = |why: UnreadReason| both(Answer::Unparsed(why));
-    for (reply, want) in [
-        (reply("B", Finish::Stop, None), both(Answer::Chosen(1))),
+    for (text, finish, refusal, want) in [
+        ("B", Finish::Stop, None, Answer::Chosen(1)),
         (
-            reply("It is B.", Finish::Stop, None),
-            (Answer::Unparsed(UnreadReason::NoChoice), Answer::Chosen(1)),
-        ),
-        (reply("", Finish::Stop, None), unparsed(UnreadReason::Empty)),
-        (
-            reply("", Finish::Stop, Some("I cannot.")),
-            unparsed(UnreadReason::Refused),
+            "",
+            Finish::Stop,
+            None,
+            Answer::Unparsed(UnreadReason::Empty),
         ),
         (
-            reply("Option B", Finish::Stop, Some("I cannot.")),
-            unparsed(UnreadReason::Refused),
+            "",
+            Finish::Stop,
+            Some("I cannot."),
+            Answer::Unparsed(UnreadReason::Refused),
         ),
         (
-            reply("", Finish::Filter, None),
-            unparsed(UnreadReason::Filtered),
+            "Option B",
+            Finish::Stop,
+            Some("I cannot."),
+            Answer::Unparsed(UnreadReason::Refused),
         ),
         (
-            reply("", Finish::Length, None),
-            unparsed(UnreadReason::Truncated),
-        ),
-        (reply("B", Finish::Length, None), both(Answer::Chosen(1))),
-        (
-            reply("The answer is B", Finish::Length, None),
-            unparsed(UnreadReason::Truncated),
+            "",
+            Finish::Filter,
+            None,
+            Answer::Unparsed(UnreadReason::Filtered),
         ),
         (
-            reply("", Finish::Other("x".into()), None),
-            unparsed(UnreadReason::Empty),
+            "",
+            Finish::Length,
+            None,
+            Answer::Unparsed(UnreadReason::Truncated),
+        ),
+        ("B", Finish::Length, None, Answer::Chosen(1)),
+        (
+            "The answer is B",
+            Finish::Length,
+            None,
+            Answer::Unparsed(UnreadReason::Truncated),
+        ),
+        (
+            "",
+            Finish::Other("x".into()),
+            None,
+            Answer::Unparsed(UnreadReason::Empty),
         ),
     ] {
-        assert_eq!(readings(&reply, &rooms), want, "{reply:?}");
+        let reply = Reply {
+            finish,
+            refusal: refusal.map(str::to_owned),
+            ..Reply::local(text.to_owned())
+        };
+        assert_eq!(readings(&reply, &rooms), (want, want), "{reply:?}");
     }
+    let sentence = Reply::local("It is B.".to_owned());
+    assert_eq!(
+        readings(&sentence, &rooms),
+        (Answer::Unparsed(UnreadReason::NoChoice), Answer::Chosen(1))
+    );
 }
 
 #[test]
@@ -217,7 +233,7 @@ fn long_replies_are_read() {
     );
     let found = read(&answered, &rooms, ReadingMode::Lenient);
     assert_eq!(found, Answer::Chosen(1));
-    // Repetitions of the strings that the steps search for. If one step were quadratic, this test would take very long.
+    // Repetitions of the strings that the parser searches for. A quadratic step would make this test very slow.
     for piece in [
         "answer: ",
         "answer is ",
@@ -247,7 +263,7 @@ fn long_replies_are_read() {
     }
 }
 
-/// Fragments that the steps search for, so that random strings of them reach every step.
+/// Fragments that the parser searches for, so that random sequences of them reach every level.
 const FRAGMENTS: [&str; 64] = [
     "A",
     "B",

@@ -1,23 +1,23 @@
 //! The texts of choices in a reply: [`texts`].
 
 use super::choice_views::{ChoiceViews, Naming};
-use super::names::{Delimiting, Name, NameState, part_of_number, same_word};
+use super::names::{Delimiting, Name, NameState, is_part_of_number, is_same_word};
 use super::states::determiner;
 use super::text::words::{Role, phrase_at};
 use super::text::{RANGE, Token, TokenKind};
 
-/// A place where the text of a choice may stand.
+/// An occurrence of the text of a choice, before overlaps are resolved.
 struct Candidate {
     start: usize,
     end: usize,
     choice: usize,
-    /// Whether the blanks differ from those of the choice: "livingroom".
-    joined: bool,
+    /// True if the spaces differ from those of the choice: "livingroom".
+    is_respaced: bool,
 }
 
-/// Every choice's text that occurs as whole words, from left to right. Longer texts take precedence. A hyphen counts as a
-/// blank, and blanks may be left out or put in between two words: "living-room", "livingroom", "arm chair". A thing's name
-/// that only modifies another noun is left out: "table-lamp", "TV stand".
+/// Every choice's text that occurs as whole words, from left to right. Longer texts take precedence. A hyphen counts as a space, and
+/// spaces may be removed or inserted between two words: "living-room", "livingroom", "arm chair". A thing's name that only modifies
+/// another noun is ignored: "table-lamp", "TV stand".
 pub(super) fn texts(
     text: &str,
     folded: &str,
@@ -25,12 +25,12 @@ pub(super) fn texts(
     offered: &ChoiceViews,
 ) -> Vec<Name> {
     let mut candidates = exact(folded, offered);
-    candidates.extend(joined(folded, tokens, offered));
+    candidates.extend(respaced(folded, tokens, offered));
     candidates.sort_by_key(|c| {
         (
             std::cmp::Reverse(c.end - c.start),
             c.start,
-            c.joined,
+            c.is_respaced,
             c.choice,
         )
     });
@@ -40,12 +40,12 @@ pub(super) fn texts(
     for candidate in candidates {
         let span = candidate.start..candidate.end;
         // Two choices may differ only in markup or spelling; then every occurrence names both.
-        let twin = last == (span.start, span.end, candidate.joined);
-        if !twin && covered[span.clone()].contains(&true) {
+        let is_twin = last == (span.start, span.end, candidate.is_respaced);
+        if !is_twin && covered[span.clone()].contains(&true) {
             continue;
         }
         covered[span.clone()].fill(true);
-        last = (span.start, span.end, candidate.joined);
+        last = (span.start, span.end, candidate.is_respaced);
         names.push(Name {
             start: span.start,
             end: span.end,
@@ -55,16 +55,14 @@ pub(super) fn texts(
         });
     }
     names.sort_by_key(|name| name.start);
-    let modifies: Vec<bool> = names
-        .iter()
-        .map(|name| modifies(text, folded, tokens, name, &names, offered))
-        .collect();
-    let mut modifies = modifies.into_iter();
-    names.retain(|_| modifies.next() != Some(true));
     names
+        .iter()
+        .filter(|name| !is_modifier(text, folded, tokens, name, &names, offered))
+        .copied()
+        .collect()
 }
 
-/// The places of the texts as they are.
+/// Occurrences of the texts as they are spelled.
 fn exact(folded: &str, offered: &ChoiceViews) -> Vec<Candidate> {
     let mut candidates = Vec::new();
     for (text, choice) in &offered.folded {
@@ -75,7 +73,7 @@ fn exact(folded: &str, offered: &ChoiceViews) -> Vec<Candidate> {
                     start,
                     end,
                     choice: *choice,
-                    joined: false,
+                    is_respaced: false,
                 });
             }
         }
@@ -83,36 +81,22 @@ fn exact(folded: &str, offered: &ChoiceViews) -> Vec<Candidate> {
     candidates
 }
 
-/// Minimum number of letters of each part of a word that is written as two.
+/// Minimum number of bytes of each part, if a word is written as two.
 const MIN_PART: usize = 3;
 
-/// The places of the texts with a blank left out ("livingroom") or put in ("arm chair").
-fn joined<'a>(
+/// Occurrences of the texts with a space removed ("livingroom") or inserted ("arm chair").
+fn respaced<'a>(
     folded: &'a str,
     tokens: &'a [Token],
     offered: &'a ChoiceViews,
 ) -> impl Iterator<Item = Candidate> + 'a {
     let longest = offered.joined.keys().map(String::len).max().unwrap_or(0);
-    let find = move |start: usize, end: usize, letters: &str| {
-        offered
-            .joined
-            .get(letters)
-            .into_iter()
-            .flatten()
-            .map(move |&choice| Candidate {
-                start,
-                end,
-                choice,
-                joined: true,
-            })
-            .collect::<Vec<_>>()
-    };
     tokens.iter().enumerate().flat_map(move |(at, token)| {
         let word = token.slice(folded);
         if longest == 0 || token.kind != TokenKind::Word || word.len() > longest {
             return Vec::new();
         }
-        let mut found = find(token.start, token.end, word);
+        let mut found = joined_choices(offered, word, token.start, token.end);
         if let Some(next) = tokens
             .get(at + 1)
             .filter(|next| next.start == token.end + 1)
@@ -121,14 +105,36 @@ fn joined<'a>(
             let fits =
                 word.len().min(second.len()) >= MIN_PART && word.len() + second.len() <= longest;
             if fits && folded.as_bytes()[token.end] == b' ' {
-                found.extend(find(token.start, next.end, &format!("{word}{second}")));
+                let letters = format!("{word}{second}");
+                found.extend(joined_choices(offered, &letters, token.start, next.end));
             }
         }
         found
     })
 }
 
-/// Whether a span is not part of a word or a number, not an article, and not a "no" before a noun.
+/// A candidate at `start..end` for each choice that consists of these letters, ignoring spaces.
+fn joined_choices(
+    offered: &ChoiceViews,
+    letters: &str,
+    start: usize,
+    end: usize,
+) -> Vec<Candidate> {
+    offered
+        .joined
+        .get(letters)
+        .into_iter()
+        .flatten()
+        .map(|&choice| Candidate {
+            start,
+            end,
+            choice,
+            is_respaced: true,
+        })
+        .collect()
+}
+
+/// True if a span is not part of a word or a number, not an article, and not a "no" before a noun.
 fn stands_alone(folded: &str, start: usize, end: usize) -> bool {
     let span = &folded[start..end];
     let (before, after) = (
@@ -136,15 +142,15 @@ fn stands_alone(folded: &str, start: usize, end: usize) -> bool {
         folded[end..].chars().next(),
     );
     let inside =
-        same_word(before, span.chars().next()) || same_word(span.chars().next_back(), after);
+        is_same_word(before, span.chars().next()) || is_same_word(span.chars().next_back(), after);
     let article = span.len() == 1 && matches!(span, "a" | "i") && after == Some(' ');
-    let determiner = span == "no" && !determiner::answers(folded, start, end);
-    !inside && !article && !determiner && !part_of_number(folded, start, end)
+    let determiner = span == "no" && !determiner::is_answer(folded, start, end);
+    !inside && !article && !determiner && !is_part_of_number(folded, start, end)
 }
 
-/// Whether a thing's name only modifies the noun behind it. By a hyphen it always does, by a blank before a listed noun. A
-/// hyphen or a dash between two choices joins two names.
-fn modifies(
+/// True if a thing's name only modifies the noun after it: always before a hyphen, and after a space only before a listed noun. A
+/// hyphen or dash between two choices joins two names instead.
+fn is_modifier(
     text: &str,
     folded: &str,
     tokens: &[Token],
@@ -167,12 +173,11 @@ fn modifies(
     if !compound && joint != Some(' ') {
         return false;
     }
-    let next = tokens.partition_point(|token| token.start <= name.end);
-    let next = tokens.get(next).filter(|next| next.start == name.end + 1);
-    let is_head = next.is_some_and(|next| {
-        let known = phrase_at(folded, std::slice::from_ref(next));
-        known.is_some_and(|(_, roles)| roles.has(Role::Head))
-    });
+    let after = tokens.partition_point(|token| token.start <= name.end);
+    let next = tokens.get(after).filter(|next| next.start == name.end + 1);
+    let is_head = next
+        .and_then(|next| phrase_at(folded, std::slice::from_ref(next)))
+        .is_some_and(|(_, roles)| roles.has(Role::Head));
     // "Kitchen-cum-bathroom" is both.
     let joins = next.is_some_and(|next| matches!(next.slice(folded), "cum" | "and" | "or"));
     let named = joins

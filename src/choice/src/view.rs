@@ -1,8 +1,10 @@
-//! [`ReplyView`]: a plain text with every name of a choice in it, and the state of each.
+//! [`ReplyView`]: a plain text with every mention of a choice, and the state of each mention.
+//!
+//! A mention is called a name: the letter or the text of a choice.
 
 use super::choice_views::ChoiceViews;
 use super::letters::letters;
-use super::named::Names;
+use super::name_index::Names;
 use super::names::{Delimiting, Name, NameState};
 use super::states::{conditional, denied, excluded, image_colors, questioned, repetitions};
 use super::text::{Clauses, Ranges, tokens};
@@ -22,12 +24,12 @@ pub(super) struct ReplyView<'a> {
     scopes: Scopes,
 }
 
-/// The stretches of a text in which a name is not simply said.
+/// Ranges of the text in which a name is not simply affirmed.
 struct Scopes {
     repeated: Ranges,
     questioned: Ranges,
     conditional: Ranges,
-    of_image: Ranges,
+    image_color: Ranges,
     excluded: Ranges,
     denied: Ranges,
 }
@@ -39,12 +41,14 @@ impl Scopes {
             (&self.repeated, NameState::Repeated),
             (&self.questioned, NameState::Questioned),
             (&self.conditional, NameState::Conditional),
-            (&self.of_image, NameState::OfImage),
+            (&self.image_color, NameState::ImageColor),
             (&self.excluded, NameState::Excluded),
             (&self.denied, NameState::Denied),
         ];
-        let state = states.iter().find(|(ranges, _)| ranges.contain(byte));
-        state.map_or(NameState::Affirmed, |(_, state)| *state)
+        states
+            .iter()
+            .find(|(ranges, _)| ranges.contain(byte))
+            .map_or(NameState::Affirmed, |(_, state)| *state)
     }
 }
 
@@ -63,16 +67,16 @@ impl<'a> ReplyView<'a> {
             texts,
         };
         for letter in &names.letters {
-            let sign = text[letter.end..].starts_with(['.', ':']);
-            if sign && names.labelled_text(letter).is_some() {
-                clauses.join(letter.end);
+            let has_sign = text[letter.end..].starts_with(['.', ':']);
+            if has_sign && names.labelled_text(letter).is_some() {
+                clauses.remove_boundary(letter.end);
             }
         }
         let scopes = Scopes {
             repeated: repetitions(&names, offered),
             questioned: questioned(&clauses, &names),
             conditional: conditional(&clauses),
-            of_image: image_colors(&clauses, &names.texts, offered),
+            image_color: image_colors(&clauses, &names.texts, offered),
             excluded: excluded(&clauses, &names),
             denied: denied(&clauses, &names),
         };
@@ -92,7 +96,7 @@ impl<'a> ReplyView<'a> {
         self.scopes.state(byte)
     }
 
-    /// The letters that are delimited from the words around them, and said.
+    /// The affirmed letters that are delimited from the words around them.
     pub(super) fn affirmed_letters(&self) -> impl Iterator<Item = &Name> + Clone {
         self.names
             .letters
@@ -100,13 +104,13 @@ impl<'a> ReplyView<'a> {
             .filter(|name| name.is_affirmed() && name.delimiting > Delimiting::Loose)
     }
 
-    /// The texts that are said.
+    /// The affirmed texts.
     pub(super) fn affirmed_texts(&self) -> impl Iterator<Item = &Name> + Clone {
         self.names.texts.iter().filter(|name| name.is_affirmed())
     }
 }
 
-/// Whether a letter lies inside the text of a choice.
+/// True if a letter is inside the text of a choice.
 fn is_within(letter: &Name, texts: &[Name]) -> bool {
     let after = texts.partition_point(|name| name.start <= letter.start);
     texts[..after]

@@ -5,9 +5,9 @@ use std::ffi::OsString;
 /// A flag whose command is now a subcommand.
 struct Mode {
     command: &'static str,
-    /// The flag, which is the name of the subcommand too.
+    /// The flag. It is also the name of the subcommand.
     flag: &'static str,
-    /// Whether the flag had a value, which is now the first word after the subcommand.
+    /// True if the flag had a value. This value is now the first word after the subcommand.
     has_value: bool,
 }
 
@@ -45,8 +45,8 @@ impl Mode {
     }
 }
 
-/// The words of a call, with the flag of a mode as the subcommand that replaces it: `enhance m --describe` is `enhance describe m`.
-/// `at` is the place of the command's name.
+/// The words of a call, with the flag of a mode replaced by its subcommand: `enhance m --describe` becomes `enhance describe m`. `at` is
+/// the place of the command's name.
 pub(super) fn in_current_form(mut words: Vec<OsString>, at: usize) -> Vec<OsString> {
     let found = MODES
         .iter()

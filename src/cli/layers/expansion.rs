@@ -1,4 +1,4 @@
-//! The values of keyed flags as the hidden flags that they set: [`Expansion`].
+//! Replaces keyed flags by the hidden flags that their keys set: [`Expansion`].
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
@@ -8,7 +8,7 @@ use clap::{Arg, ArgAction, Command};
 use super::layered_value::LayeredValue;
 use crate::cli::keyed::{name_of, with_value};
 use crate::error::{Error, Result};
-use crate::types::flags::{KEYED_FLAGS, KeyedFlag, KeyedSetting, spelled};
+use crate::types::flags::{KEYED_FLAGS, KeyedFlag, KeyedSetting, flag_spelling};
 
 /// The keyed flags of a command, and the hidden flags that their keys set.
 pub(super) struct Expansion<'a>(pub(super) &'a Command);
@@ -20,7 +20,7 @@ impl Expansion<'_> {
 
     /// The keyed flag with this name, if the command has it.
     fn keyed(&self, name: &str) -> Option<&'static KeyedFlag> {
-        let keyed = KeyedFlag::named(name)?;
+        let keyed = KeyedFlag::from_name(name)?;
         let is_used = keyed
             .keys
             .iter()
@@ -28,7 +28,7 @@ impl Expansion<'_> {
         is_used.then_some(keyed)
     }
 
-    /// The settings in the value of a keyed flag, each with a value.
+    /// The settings in the value of a keyed flag. A key without a value gets its implied value.
     fn settings(&self, keyed: &KeyedFlag, text: &str) -> Result<Vec<KeyedSetting>, String> {
         let mut settings = keyed.settings(text, |flag| self.flag(flag).is_some())?;
         for setting in settings.iter_mut().filter(|one| one.value.is_none()) {
@@ -41,8 +41,8 @@ impl Expansion<'_> {
                 }
                 ([only], _) => Some(only.get_name().to_owned()),
                 _ => {
-                    let spelled = spelled(setting.flag);
-                    let key = spelled.rsplit(' ').next().unwrap_or_default();
+                    let spelling = flag_spelling(setting.flag);
+                    let key = spelling.rsplit(' ').next().unwrap_or_default();
                     let form = arg.map(|arg| with_value(key, arg)).unwrap_or_default();
                     return Err(format!("{key} has no value; write {form}"));
                 }
@@ -51,7 +51,7 @@ impl Expansion<'_> {
         Ok(settings)
     }
 
-    /// The typed words, with the values of keyed flags as the hidden flags that they set.
+    /// The typed words, with each keyed flag replaced by the hidden flags that its keys set.
     ///
     /// # Errors
     /// If a key is unknown or has no value.
@@ -78,7 +78,7 @@ impl Expansion<'_> {
                 None if is_joined => value,
                 Some(next) => match next.into_string() {
                     Ok(value) => value,
-                    // Only a path may be no Unicode, and a path has no key.
+                    // Only a path may be other than Unicode, and a path has no keys.
                     Err(next) => {
                         expanded.extend([word, next]);
                         continue;
@@ -89,17 +89,19 @@ impl Expansion<'_> {
                     break;
                 }
             };
-            let problem = |problem| Error::usage(format!("--{name}"), problem);
-            for setting in self.settings(keyed, &value).map_err(problem)? {
-                expanded.extend(self.word(&setting, &name)?);
+            let settings = self
+                .settings(keyed, &value)
+                .map_err(|problem| Error::usage(format!("--{name}"), problem))?;
+            for setting in settings {
+                expanded.extend(self.hidden_flag(&setting, &name)?);
             }
         }
         expanded.extend(words);
         Ok(expanded)
     }
 
-    /// The word of a setting; none for a switch that is turned off.
-    fn word(&self, setting: &KeyedSetting, name: &str) -> Result<Option<OsString>> {
+    /// The word that sets the hidden flag of a setting; `None` for a switch that is turned off.
+    fn hidden_flag(&self, setting: &KeyedSetting, name: &str) -> Result<Option<OsString>> {
         let KeyedSetting { flag, value } = setting;
         let value = value.as_deref().unwrap_or_default();
         let takes_values = self
@@ -110,7 +112,7 @@ impl Expansion<'_> {
             "true" | "yes" | "1" => Ok(Some(format!("--{flag}").into())),
             "false" | "no" | "0" => Ok(None),
             _ => {
-                let key = spelled(flag);
+                let key = flag_spelling(flag);
                 let key = key.rsplit(' ').next().unwrap_or_default();
                 let problem = format!("{key} takes true or false, not {value:?}");
                 Err(Error::usage(format!("--{name}"), problem))
@@ -118,7 +120,7 @@ impl Expansion<'_> {
         }
     }
 
-    /// The values of a layer, with those of keyed flags under the names of the hidden flags that they set.
+    /// The values of a layer, with each keyed flag replaced by the hidden flags that its keys set.
     ///
     /// # Errors
     /// If a key is unknown or has no value, or the layer sets it twice.
@@ -151,6 +153,7 @@ impl Expansion<'_> {
         Ok(layer)
     }
 
+    /// Adds a setting to a layer.
     fn insert(
         &self,
         layer: &mut BTreeMap<String, LayeredValue>,
@@ -165,7 +168,7 @@ impl Expansion<'_> {
             Some(known) => {
                 let problem = format!(
                     "{} is set twice, by {} too",
-                    spelled(setting.flag),
+                    flag_spelling(setting.flag),
                     known.origin
                 );
                 return Err(Error::usage(origin, problem));

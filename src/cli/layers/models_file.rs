@@ -7,12 +7,12 @@ use super::value_text::text_of;
 use crate::engine::models::{RunDefault, run_defaults};
 use crate::error::{Error, Result};
 
-/// The flags of the run that a file of models sets, each with its place and its text; `flags` are those of the command.
+/// The flags of the run that a file of models sets, each with its place in the file and its text. `flags` are those of the command.
 ///
 /// # Errors
 /// If the command has no such flag, or the value has a form that no flag has.
 pub(super) fn values(path: &Path, flags: &[String]) -> Result<Vec<(String, String, OsString)>> {
-    // A file that cannot be used is an error where its models are read.
+    // An unusable file is reported later, where its models are read.
     let defaults = run_defaults(path).unwrap_or_default();
     defaults
         .into_iter()

@@ -1,20 +1,21 @@
 //! Refuses a file of flags that sends secrets to an address of its own: [`check`].
 //!
-//! Such a file may come from a repository beside a paper. It may name an address, or what is sent to one; with both it could take any
-//! file or variable of the user to a stranger. So what is sent must then be the file's own, or belong to the address.
+//! Such a file may come from a stranger, for example from the repository of a paper. It may name an address, or what is sent to one.
+//! With both it could send any file or variable of the user to its author. So a file that names an address may only send files from
+//! its own folder, and variables that belong to this address.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use super::layered_value::LayeredValue;
 use crate::ask::{BaseUrl, OPENAI_KEY, vendor_variables};
 use crate::error::{Error, Result};
-use crate::types::flags::spelled;
+use crate::types::flags::flag_spelling;
 
-/// The flags that say where requests go, or who may read them on their way.
+/// The flags that decide where requests go, or who may read them on their way.
 const ADDRESSES: [&str; 3] = ["base-url", "judge-base-url", "ca-file"];
 
-/// The flags that name an address, each with those that say which key goes there.
+/// The flags that name an address, each with the flags that decide which key goes there.
 const KEYS: [(&str, [&str; 2]); 2] = [
     ("base-url", ["api-key-env", "api-key-file"]),
     (
@@ -23,13 +24,13 @@ const KEYS: [(&str, [&str; 2]); 2] = [
     ),
 ];
 
-/// The flags that change which keys go where: a table of vendors names the variable of a host's key.
+/// The flags that change which key goes to which address: a table of vendors names the variable of a host's key.
 const KEY_RULES: [&str; 2] = ["key-anyway", "vendor"];
 
-/// The flags that name a variable whose value is sent; of a header after `=`.
+/// The flags that name a variable whose value is sent. In `header-env`, the variable stands after `=`.
 const VARIABLES: [&str; 3] = ["api-key-env", "judge-api-key-env", "header-env"];
 
-/// The flags that name a file whose text is sent, after `@` in a body.
+/// The flags that name a file whose text is sent. In `extra-body`, the file stands after `@`.
 const FILES: [&str; 5] = [
     "api-key-file",
     "judge-api-key-file",
@@ -38,39 +39,31 @@ const FILES: [&str; 5] = [
     "prompts",
 ];
 
-/// Refuses a file of flags that sets an address, and to be sent there a variable of another host or a file outside its own folder.
-/// `values` are those of the file that are in effect; `is_set` says whether any layer sets a flag, and `has_key` whether there is a key
-/// for addresses that no table has.
+/// Refuses a file of flags that sets an address and also sends a variable of another host, or a file outside its own folder.
+/// `values` are those of the file that are in effect. `flags_set` has the flags that any layer sets. `has_key` is true if there is a
+/// default key, which is sent to addresses of unknown vendors.
 ///
 /// # Errors
 /// Names the key of the file, and the flag to type instead.
 pub(super) fn check(
     file: &Path,
     values: &BTreeMap<String, &LayeredValue>,
-    is_set: impl Fn(&str) -> bool,
+    flags_set: &BTreeSet<String>,
     has_key: bool,
 ) -> Result<()> {
     let address = ADDRESSES.iter().find(|flag| values.contains_key(**flag));
     let Some(address) = address else {
         return Ok(());
     };
-    let refuse = |flag: &str, value: &LayeredValue, what: &str| {
-        let problem = format!(
-            "the file sets --{address}, too, so that {what} could be sent to an unknown server; name it on the command line with \
-             {}, or remove --{address} from the file",
-            spelled(flag)
-        );
-        Err(Error::usage(&value.origin, problem))
-    };
     if let Some((flag, value)) = KEY_RULES.iter().find_map(|flag| entry(values, flag)) {
-        return refuse(flag, value, "a key of yours");
+        return Err(refusal(address, flag, value, "a key of yours"));
     }
     let unnamed = KEYS
         .iter()
-        .filter(|(_, keys)| !keys.iter().any(|flag| is_set(flag)));
-    for (address, [key, _]) in unnamed {
+        .filter(|(_, keys)| !keys.iter().any(|flag| flags_set.contains(*flag)));
+    for (key_address, [key, _]) in unnamed {
         let value = values
-            .get(*address)
+            .get(*key_address)
             .filter(|value| has_key && goes_elsewhere(value));
         if let Some(value) = value {
             let problem = format!(
@@ -83,8 +76,8 @@ pub(super) fn check(
     for (flag, value) in VARIABLES.iter().filter_map(|flag| entry(values, flag)) {
         for text in value.values.iter().filter_map(|value| value.to_str()) {
             let name = text.split_once('=').map_or(text, |(_, name)| name).trim();
-            if name != "none" && !hosts(values).any(|own| own.contains(&name)) {
-                return refuse(flag, value, "a variable of yours");
+            if name != "none" && !host_variables(values).any(|own| own.contains(&name)) {
+                return Err(refusal(address, flag, value, "a variable of yours"));
             }
         }
     }
@@ -96,13 +89,24 @@ pub(super) fn check(
                 _ => Some(named),
             };
             if named.is_some_and(|named| !is_beside(file, named)) {
-                return refuse(flag, value, "a file of yours");
+                return Err(refusal(address, flag, value, "a file of yours"));
             }
         }
     }
     Ok(())
 }
 
+/// The error that `flag` sends something of the user to an address that the file sets with the flag `address`.
+fn refusal(address: &str, flag: &str, value: &LayeredValue, what: &str) -> Error {
+    let problem = format!(
+        "the file sets --{address}, too, so that {what} could be sent to an unknown server; name it on the command line with \
+         {}, or remove --{address} from the file",
+        flag_spelling(flag)
+    );
+    Error::usage(&value.origin, problem)
+}
+
+/// A flag with its value in the file.
 fn entry<'a>(
     values: &BTreeMap<String, &'a LayeredValue>,
     flag: &'static str,
@@ -110,8 +114,10 @@ fn entry<'a>(
     Some((flag, *values.get(flag)?))
 }
 
-/// The variables of the own tools of each host that the file names.
-fn hosts(values: &BTreeMap<String, &LayeredValue>) -> impl Iterator<Item = Vec<&'static str>> {
+/// The variables in which the vendor of each host that the file names keeps its key.
+fn host_variables(
+    values: &BTreeMap<String, &LayeredValue>,
+) -> impl Iterator<Item = Vec<&'static str>> {
     ["base-url", "judge-base-url"]
         .into_iter()
         .filter_map(|flag| values.get(flag))
@@ -120,7 +126,7 @@ fn hosts(values: &BTreeMap<String, &LayeredValue>) -> impl Iterator<Item = Vec<&
         .map(|url| vendor_variables(url.host()))
 }
 
-/// Whether one of these addresses is of another machine, and of no known vendor.
+/// Returns true if one of these addresses is on another machine and belongs to no known vendor.
 fn goes_elsewhere(addresses: &LayeredValue) -> bool {
     addresses
         .values
@@ -129,7 +135,8 @@ fn goes_elsewhere(addresses: &LayeredValue) -> bool {
         .any(|url| !url.is_loopback() && vendor_variables(url.host()).is_empty())
 }
 
-/// Whether a file lies in the folder of the file of flags or below it, links followed. One that is not there is refused later.
+/// Returns true if a file lies in the folder of the file of flags or below it, with links followed. A file that does not exist also
+/// returns true: it is refused later.
 fn is_beside(file: &Path, named: &Path) -> bool {
     let folder = file.canonicalize().ok();
     let folder = folder.as_deref().and_then(Path::parent);

@@ -7,7 +7,7 @@ use clap::CommandFactory as _;
 
 use super::*;
 use crate::cli::{Cli, command};
-use crate::types::flags::spelled;
+use crate::types::flags::flag_spelling;
 
 /// The command line, made once for all calls.
 static COMMAND: LazyLock<Command> = LazyLock::new(command::command);
@@ -22,16 +22,15 @@ fn parsed(words: &[&str], variables: &[(&str, &str)], file: &str) -> Result<ArgM
     if !file.is_empty() {
         words.extend(["--config".into(), path.into()]);
     }
-    let variable = |name: &str| {
-        let found = variables.iter().find(|(known, _)| *known == name);
-        found.map(|(_, value)| value.into())
-    };
-    parse(COMMAND.clone(), words, variable)
-        .map(|parsed| parsed.matches)
-        .map_err(|problem| match problem {
-            Problem::Error(error) => error.to_string(),
-            Problem::Help(help) => help.to_string(),
-        })
+    let variables: BTreeMap<&str, &str> = variables.iter().copied().collect();
+    parse(COMMAND.clone(), words, |name| {
+        Some(variables.get(name)?.into())
+    })
+    .map(|parsed| parsed.matches)
+    .map_err(|problem| match problem {
+        Problem::Error(error) => error.to_string(),
+        Problem::Help(help) => help.to_string(),
+    })
 }
 
 /// The values of a flag of the command that is called.
@@ -131,8 +130,10 @@ fn every_flag_can_be_set_by_word_variable_and_file() {
     all.build();
     let (mut wrong, mut count) = (Vec::new(), 0);
     for (path, command) in commands(&all, &[]) {
-        let has_own = |arg: &Arg| !arg.is_global_set() && arg.get_id() != "help";
-        if !path.is_empty() && !command.get_arguments().any(has_own) {
+        let has_own_flags = command
+            .get_arguments()
+            .any(|arg| !arg.is_global_set() && arg.get_id() != "help");
+        if !path.is_empty() && !has_own_flags {
             continue;
         }
         for arg in settable_flags(&command) {
@@ -306,15 +307,12 @@ fn a_flag_hides_conflicting_flags_of_lower_layers() {
 
 #[test]
 fn errors_name_the_source_of_a_value_and_suggest_a_correction() {
-    let wrong = |words: &[&str], variables: &[(&str, &str)], file: &str| {
-        parsed(words, variables, file).unwrap_err()
-    };
-    let error = wrong(&[], &[("DARKQA_RETRIES", "many")], "");
+    let error = parsed(&[], &[("DARKQA_RETRIES", "many")], "").unwrap_err();
     assert!(
         error.starts_with("DARKQA_RETRIES: invalid value 'many'"),
         "{error}"
     );
-    for (words, file, says) in [
+    for (words, file, part) in [
         (
             &[][..],
             "sed = 1",
@@ -357,8 +355,8 @@ fn errors_name_the_source_of_a_value_and_suggest_a_correction() {
             "a similar value exists: 'paper'",
         ),
     ] {
-        let error = wrong(words, &[], file);
-        assert!(error.contains(says), "{says}: {error}");
+        let error = parsed(words, &[], file).unwrap_err();
+        assert!(error.contains(part), "{part}: {error}");
         assert_eq!(error.lines().count(), 1, "{error}");
         assert!(!error.contains("COMMAND"), "{error}");
     }
@@ -375,20 +373,14 @@ fn words_after_two_dashes_stay_where_they_are() {
 #[test]
 fn a_place_of_data_with_commas_is_one_value_and_several_are_several() {
     let rooms = "rooms:frames=4,seed=7";
-    let of = |words: &[&str], variables: &[(&str, &str)], file: &str| {
-        values(&parsed(words, variables, file).unwrap(), "data")
-    };
-    assert_eq!(of(&["check"], &[("DARKQA_DATA", rooms)], ""), [rooms]);
-    assert_eq!(
-        of(&["check"], &[], "data = [\"a.csv\", \"b.csv\"]"),
-        ["a.csv", "b.csv"]
-    );
-    // A call replaces what a variable says, and does not add to it.
+    let matches = parsed(&["check"], &[("DARKQA_DATA", rooms)], "").unwrap();
+    assert_eq!(values(&matches, "data"), [rooms]);
+    let matches = parsed(&["check"], &[], "data = [\"a.csv\", \"b.csv\"]").unwrap();
+    assert_eq!(values(&matches, "data"), ["a.csv", "b.csv"]);
+    // Typed values replace those of a variable; they are not added to them.
     let typed = ["check", "--data", "a.csv", "--data=b.csv"];
-    assert_eq!(
-        of(&typed, &[("DARKQA_DATA", rooms)], ""),
-        ["a.csv", "b.csv"]
-    );
+    let matches = parsed(&typed, &[("DARKQA_DATA", rooms)], "").unwrap();
+    assert_eq!(values(&matches, "data"), ["a.csv", "b.csv"]);
     let map = "question=q,options=A,B";
     let matches = parsed(&["check"], &[("DARKQA_MAP", map)], "").unwrap();
     assert_eq!(values(&matches, "map"), [map]);
@@ -411,7 +403,7 @@ fn a_file_sends_nothing_of_the_user_to_an_address_of_its_own() {
         let words: Vec<&str> = words.split_whitespace().collect();
         let flag = line.split(' ').next().unwrap();
         let problem = parsed(&words, &[], &format!("{own}{line}\n")).unwrap_err();
-        let named = format!("name it on the command line with {}", spelled(flag));
+        let named = format!("name it on the command line with {}", flag_spelling(flag));
         assert!(
             problem.contains(&named) && problem.contains("--base-url"),
             "{line}: {problem}"
@@ -447,10 +439,6 @@ fn a_file_sends_nothing_of_the_user_to_an_address_of_its_own() {
 fn the_default_key_goes_to_no_address_that_only_a_file_names() {
     let set = [("OPENAI_API_KEY", "sk-1")];
     let own = "base-url = \"https://evil.example/v1\"\n";
-    let refused = |words: &str, variables: &[(&str, &str)], file: &str| {
-        let words: Vec<&str> = words.split_whitespace().collect();
-        parsed(&words, variables, file).err()
-    };
     for (words, file, flag) in [
         ("", own, "--api-key-env OPENAI_API_KEY"),
         (
@@ -459,10 +447,11 @@ fn the_default_key_goes_to_no_address_that_only_a_file_names() {
             "--judge-api-key-env OPENAI_API_KEY",
         ),
     ] {
-        let problem = refused(words, &set, file).unwrap();
+        let words: Vec<&str> = words.split_whitespace().collect();
+        let problem = parsed(&words, &set, file).unwrap_err();
         assert!(problem.contains(flag), "{problem}");
         assert!(problem.contains("c.toml, "), "{problem}");
-        assert_eq!(refused(words, &[], file), None, "{file}");
+        assert_eq!(parsed(&words, &[], file).err(), None, "{file}");
     }
     for (words, file) in [
         ("--api-key-env OPENAI_API_KEY", own),
@@ -470,6 +459,7 @@ fn the_default_key_goes_to_no_address_that_only_a_file_names() {
         ("", "base-url = \"http://127.0.0.1:8000/v1\"\n"),
         ("", "base-url = \"https://api.openai.com/v1\"\n"),
     ] {
-        assert_eq!(refused(words, &set, file), None, "{words} {file}");
+        let words: Vec<&str> = words.split_whitespace().collect();
+        assert_eq!(parsed(&words, &set, file).err(), None, "{words:?} {file}");
     }
 }

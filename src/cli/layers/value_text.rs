@@ -4,7 +4,7 @@ use std::ffi::OsString;
 
 use toml::Value;
 
-/// The text of a value; `None` if it is no text, number or switch.
+/// The text of a value; `None` if it is not a text, a number or a switch.
 pub(super) fn text_of(value: &Value) -> Option<OsString> {
     match value {
         Value::String(text) => Some(text.into()),

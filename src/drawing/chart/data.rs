@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::{Chart, LineContent, LineItems, Panel, PlotLine};
 use crate::error::Result;
-use crate::text::script::embedded;
+use crate::text::script::to_script_json;
 use crate::text::words::{percent, with_interval};
 use crate::types::degradations::Axis;
 use darkqa_score::estimate::Estimate;
@@ -76,7 +76,7 @@ impl ChartData {
     /// # Errors
     /// None in practice: JSON can represent every value of a chart.
     pub(crate) fn json(chart: &Chart) -> Result<String> {
-        embedded(&Self::new(chart))
+        to_script_json(&Self::new(chart))
     }
 
     fn new(chart: &Chart) -> Self {

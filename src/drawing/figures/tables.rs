@@ -118,7 +118,7 @@ impl FigureBuilder<'_> {
             .levels
             .iter()
             .copied()
-            .filter(|level| level.is_shown_on(axis))
+            .filter(|level| level.belongs_to(axis))
             .filter(|level| rows.iter().any(|(_, cells)| cells.contains_key(level)))
             .collect();
         let rows = rows

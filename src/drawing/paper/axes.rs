@@ -153,7 +153,7 @@ mod tests {
             .chain(
                 drops
                     .into_iter()
-                    .map(|drop| AxisLevel::new(Kind::Sensor, Severity::hundredths(drop))),
+                    .map(|drop| AxisLevel::new(Kind::Sensor, Severity::from_hundredths(drop))),
             )
             .collect();
         let axes = Axes {

@@ -105,7 +105,7 @@ impl<'a> VariantThumbnails<'a> {
                 .map(|thumbnail| &thumbnail.condition)
                 .filter(|condition| {
                     condition.enhancer.is_none()
-                        && (condition.kind_reading() == *self.variant
+                        && (condition.variant() == *self.variant
                             || condition.level() == AxisLevel::L0)
                 })
                 .map(Condition::level)
@@ -147,7 +147,7 @@ impl<'a> VariantThumbnails<'a> {
             thumbnail.frame == *frame
                 && condition.level() == level
                 && condition.enhancer.as_ref() == enhancer
-                && (level == AxisLevel::L0 || condition.kind_reading() == *self.variant)
+                && (level == AxisLevel::L0 || condition.variant() == *self.variant)
         })
     }
 }

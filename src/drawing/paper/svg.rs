@@ -10,7 +10,7 @@ use super::sheet::{Colour, Label, Point, Shape, Sheet, Stroke, TextDirection};
 use crate::drawing::chart::INK;
 use crate::error::Result;
 use crate::types::Rgb;
-use crate::types::text::shown;
+use crate::types::text::escape_hidden;
 
 /// Encoder of an image as PNG.
 pub(crate) type Png<'a> = &'a dyn Fn(&Rgb) -> Result<Vec<u8>>;
@@ -30,7 +30,7 @@ pub(crate) fn svg(sheet: &Sheet, png: Png) -> Result<String> {
         text.push('\n');
     }
     text += "</svg>\n";
-    Ok(shown(&text).into_owned())
+    Ok(escape_hidden(&text).into_owned())
 }
 
 /// Number with at most two decimals.

@@ -9,7 +9,7 @@ use std::ops::Range;
 
 use super::font::Font;
 use super::look::Look;
-use crate::text::latex::{MOST_ROWS, escaped};
+use crate::text::latex::{MAX_ROWS, escape};
 use crate::text::table::{Column, ColumnKind, Table, TableCell, TableFormat, TableRow};
 use crate::text::words::{interval, words};
 use darkqa_score::estimate::Estimate;
@@ -58,7 +58,7 @@ struct Layout {
 /// more than forty rows.
 pub(crate) fn tables(all: &[Table], look: &Look, is_wide: bool) -> (Vec<(String, Vec<u8>)>, usize) {
     let (long, short): (Vec<&Table>, Vec<&Table>) =
-        all.iter().partition(|table| table.rows.len() > MOST_ROWS);
+        all.iter().partition(|table| table.rows.len() > MAX_ROWS);
     let float = if is_wide { "table*" } else { "table" };
     let mut text =
         format!("% Tables of darkqa-eval. In the preamble: \\usepackage{{booktabs}}\n{COMMANDS}");
@@ -254,7 +254,7 @@ fn name_latex(row: &TableRow, width: f64) -> String {
 
 /// Escapes a text for LaTeX.
 fn latex(plain: &str) -> String {
-    escaped(plain)
+    escape(plain)
         .replace('–', "--")
         .replace('↓', "$\\downarrow$")
 }

@@ -7,8 +7,8 @@ use super::legend::Legend;
 use super::look::Look;
 use super::sheet::{Colour, Stroke};
 use crate::drawing::chart::{Chart, LineContent, Panel, PlotLine};
-use crate::text::latex::escaped;
-use crate::types::text::shown;
+use crate::text::latex::escape;
+use crate::types::text::escape_hidden;
 
 /// Space left of the first axes in a row, in em.
 const FIRST: f64 = 4.6;
@@ -82,7 +82,7 @@ pub(crate) fn tex(name: &str, chart: &Chart, look: &Look) -> Vec<(String, Vec<u8
                 named.push(&line.name);
                 let max_width = (look.width - SAMPLE) / WIDER;
                 let entry = Font::bundled().shortened(&line.name, look.font_size, max_width);
-                let _ = writeln!(text, "\\addlegendentry{{{}}}", escaped(&entry));
+                let _ = writeln!(text, "\\addlegendentry{{{}}}", escape(&entry));
             }
         }
         files.push((data, data_file(panel).into_bytes()));
@@ -134,9 +134,9 @@ fn axes_options(panel: &Panel, measure: &str) -> String {
     format!(
         "\\nextgroupplot[title={{{}}}, xlabel={{{}}}, ylabel={{{}}}, xmin={}, xmax={},\n  xtick={{{}}}, xticklabels={{{}}}, \
          xticklabel style={{align=center}}",
-        escaped(&panel.title),
-        escaped(&panel.axis_title()),
-        escaped(measure),
+        escape(&panel.title),
+        escape(&panel.axis_title()),
+        escape(measure),
         -0.035 * panel.axis_end(),
         1.035 * panel.axis_end(),
         ticks.join(","),
@@ -248,7 +248,7 @@ fn data_file(panel: &Panel) -> String {
         .collect();
     for (number, line, _) in &curves {
         let name = line.name.replace(['\n', '\r'], " ");
-        let name = shown(&name);
+        let name = escape_hidden(&name);
         let _ = writeln!(
             text,
             "# y{number}, low{number}, high{number}: {name}, in percent"

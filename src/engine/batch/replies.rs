@@ -70,7 +70,7 @@ impl<'a, D: Detail> ReplyImport<'a, D> {
             self.counts.imported_before += 1;
             return Ok(());
         }
-        let mut blank = blank.clone().batched();
+        let mut blank = blank.clone().in_batch();
         let bound = std::mem::take(&mut blank.lost.unstated);
         let reply = match line.result {
             Ok(reply) => reply,
@@ -114,7 +114,7 @@ impl<'a, D: Detail> ReplyImport<'a, D> {
             && !self.failures.contains_key(&key)
             && let Some(blank) = self.blanks.get(&key)
         {
-            let mut blank = blank.clone().batched();
+            let mut blank = blank.clone().in_batch();
             blank.lost = LostAttempts::default();
             self.failures.insert(key, FailedTrial { blank, failure });
         }
@@ -136,7 +136,7 @@ impl<'a, D: Detail> ReplyImport<'a, D> {
     pub(super) fn finish(mut self) -> Result<ReplyCounts> {
         for FailedTrial { blank, failure } in std::mem::take(&mut self.failures).into_values() {
             self.counts.failed += 1;
-            self.store.append(&blank.failed_by(failure, 1))?;
+            self.store.append(&blank.with_failure(failure, 1))?;
         }
         self.store.sync()?;
         Ok(self.counts)

@@ -12,7 +12,7 @@ use super::name::ModelName;
 use crate::ask::Price;
 use crate::error::{Error, Result};
 use crate::types::View;
-use crate::types::text::near_name::{nearest, question};
+use crate::types::text::near_name::{did_you_mean, nearest};
 
 /// Keys of a model that do not correspond to a flag, or have another form than the flag.
 const MODEL_KEYS: [&str; 10] = [
@@ -182,7 +182,7 @@ pub(super) fn check_keys(keys: &Keys, is_defaults: bool) -> Result<()> {
                 .find(|(foreign, _)| foreign == key)
                 .map(|(_, key)| *key)
                 .or_else(|| nearest(key, &known));
-            let hint = question(meant);
+            let hint = did_you_mean(meant);
             return Err(located.error(format_args!("there is no key {key}{hint}")));
         }
     }

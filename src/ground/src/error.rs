@@ -1,7 +1,7 @@
 //! The one error type of the crate.
 //!
 //! Each variant names the cause and the place; its message ends with the remedy. There is no `From<io::Error>`: an error of
-//! the operating system is of no use without its path.
+//! the operating system is useless without its path.
 
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 /// A `Result` with this crate's [`Error`].
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// An error, by its cause.
+/// A failure that the user can understand and repair.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -87,22 +87,25 @@ pub enum Error {
     },
 }
 
-/// The most characters of a line of a message about data; a longer one loses its middle (chosen).
-const LONGEST_LINE: usize = 600;
+/// Maximum length of a line in a message about data, in characters; chosen. A longer line loses its middle.
+const MAX_LINE_CHARS: usize = 600;
 
-/// The characters that a line that is too long keeps at its start, and at its end, where the remedy stands.
-const KEPT: (usize, usize) = (300, 200);
+/// Characters kept at the start of a line that is too long.
+const KEPT_START: usize = 300;
 
-/// A text whose lines are no longer than a message may be, whatever names and values data hold.
-fn bounded(text: &str) -> String {
+/// Characters kept at the end of a line that is too long, where the remedy is.
+const KEPT_END: usize = 200;
+
+/// Shortens each line that is too long for a message: names and values in data may have any length.
+fn shorten_lines(text: &str) -> String {
     text.split('\n')
         .map(|line| {
             let length = line.chars().count();
-            if length <= LONGEST_LINE {
+            if length <= MAX_LINE_CHARS {
                 return line.to_owned();
             }
-            let start: String = line.chars().take(KEPT.0).collect();
-            let end: String = line.chars().skip(length - KEPT.1).collect();
+            let start: String = line.chars().take(KEPT_START).collect();
+            let end: String = line.chars().skip(length - KEPT_END).collect();
             format!("{start} … {end}")
         })
         .collect::<Vec<String>>()
@@ -130,12 +133,12 @@ impl Error {
     /// An error in a data file; `place` is its path, with the line or frame if known.
     pub fn data(place: impl Display, problem: impl Display) -> Self {
         Self::Data {
-            place: bounded(&place.to_string()),
-            problem: bounded(&problem.to_string()),
+            place: shorten_lines(&place.to_string()),
+            problem: shorten_lines(&problem.to_string()),
         }
     }
 
-    /// The same error at another flag or place: the parser of a type does not know the flag of its value.
+    /// Returns the error with another origin: the parser of a value does not know which flag or file the value came from.
     #[must_use]
     pub fn at(self, origin: impl Into<String>) -> Self {
         match self {
@@ -151,7 +154,7 @@ impl Error {
         }
     }
 
-    /// An error of a flag or variable at another one; any other error stays where it is.
+    /// Returns a usage error with another origin, and any other error unchanged.
     #[must_use]
     pub fn usage_at(self, origin: &str) -> Self {
         match self {

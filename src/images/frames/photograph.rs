@@ -43,10 +43,10 @@ pub(crate) fn matching_degradation(
 ) -> Option<(Degradation, PairFacts)> {
     let facts = photos.first()?.facts?;
     let hundredths = (100.0 * facts.matching()?).round();
-    if !(1.0..=f64::from(kind.largest().in_hundredths())).contains(&hundredths) {
+    if !(1.0..=f64::from(kind.max_severity().hundredths())).contains(&hundredths) {
         return None;
     }
-    let severity = Severity::hundredths(hundredths as u16);
+    let severity = Severity::from_hundredths(hundredths as u16);
     let how = Degradation::new(kind, severity, reading.cloned()).ok()?;
     Some((how, facts))
 }

@@ -158,7 +158,7 @@ fn crop_gain(condition: &Condition, sent: &Payload) -> f32 {
     match (condition.degradation(), sent.facts().exposure) {
         // Automatic exposure: only the darkness that the camera did not compensate.
         (Some(_), Some(exposure)) => exposure.dark.unwrap_or_default() as f32,
-        (Some(degradation), None) => degradation.kind().relight(degradation.severity()),
+        (Some(degradation), None) => degradation.kind().display_gain(degradation.severity()),
         // Photograph of a pair: its drop in light.
         (None, _) => sent
             .facts()

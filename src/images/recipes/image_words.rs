@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 use crate::images::frames::WalkArgs;
 use crate::picture::ImageArgs;
 use crate::types::Decides;
-use crate::types::flags::spelled;
+use crate::types::flags::flag_spelling;
 use darkqa_enhance::{EnhancedFolder, SizeArgs};
 use darkqa_light::{CameraArgs, SensorArgs};
 
@@ -101,7 +101,7 @@ pub(crate) fn typed_flags(matches: &ArgMatches) -> Result<ImageWords> {
             .collect::<Option<Vec<Value>>>()
             .ok_or_else(|| {
                 let problem = "cannot be stored in the manifest: the value is not valid Unicode";
-                Error::usage(spelled(flag), problem)
+                Error::usage(flag_spelling(flag), problem)
             })?;
         let value = match texts.pop() {
             _ if !action.takes_values() => Value::Bool(true),

@@ -20,7 +20,7 @@ pub(crate) fn conditions(
     let photographs = photographs.iter().cloned().map(PairDark::Photograph);
     let pairs = light.matches.iter().cloned().chain(photographs);
     for treatment in degradations.chain(pairs.map(Treatment::Paired)) {
-        let is_enhanced = on.has(&treatment);
+        let is_enhanced = on.includes(&treatment);
         let raw = Condition::raw(treatment);
         all.push(raw.clone());
         if is_enhanced {
@@ -42,17 +42,18 @@ pub(crate) fn check_used(light: &LightSettings, args: &EnhancerArgs) -> Result<(
     let Some(asked) = degradations
         .iter()
         .map(|degradation| TreatmentSet::only(degradation.as_ref().map(Degradation::kind)))
-        .reduce(TreatmentSet::or)
+        .reduce(TreatmentSet::union)
     else {
         return Ok(());
     };
     let on = args.on();
     // Photographs in the dark are known only after the data are opened; `check_enhanced` checks them.
-    let may_enhance_pairs = on.and(TreatmentSet::DARK).is_some() || !light.matches.is_empty();
-    if args.is_empty() || may_enhance_pairs || asked.and(on).is_some() {
+    let may_enhance_pairs =
+        on.intersection(TreatmentSet::DARK).is_some() || !light.matches.is_empty();
+    if args.is_empty() || may_enhance_pairs || asked.intersection(on).is_some() {
         return Ok(());
     }
-    let problem = match asked.and(light.variants.into()) {
+    let problem = match asked.intersection(light.variants.into()) {
         None => "only L0 is asked; --llie-on l0 enhances the untouched images".to_owned(),
         Some(dark) => {
             format!("--llie-on {on} is not among the images asked; --llie-on {dark} is")

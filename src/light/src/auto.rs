@@ -245,7 +245,7 @@ mod tests {
             (750, [2.0, 4.0, 1.5, 1.0 / 30.0, 6.0]),
             (900, [2.0, 4.0, 3.0, 1.0 / 30.0, 6.0]),
         ] {
-            let shot = auto.shot(Severity::hundredths(drop));
+            let shot = auto.shot(Severity::from_hundredths(drop));
             let found = [
                 shot.shutter,
                 shot.gain,

@@ -177,7 +177,7 @@ impl CaptureState {
 
 /// The severity of a drop with at most two decimals, for which the exposure drop has an exact table; `None` for other drops.
 fn exact_severity(drop_ev: f64) -> Option<Severity> {
-    let severity = Severity::hundredths((100.0 * drop_ev).round() as u16);
+    let severity = Severity::from_hundredths((100.0 * drop_ev).round() as u16);
     (severity.value().to_bits() == drop_ev.to_bits()).then_some(severity)
 }
 

@@ -278,13 +278,13 @@ mod tests {
             (1600, [0, 0, 1, 1, 1, 1, 1, 2], 0xa670_34d3),
         ];
         for (hundredths, expected, crc) in entries {
-            let table = table(Severity::hundredths(hundredths));
+            let table = table(Severity::from_hundredths(hundredths));
             let found = [32, 64, 96, 128, 160, 192, 224, 255].map(|code: usize| table[code]);
             assert_eq!(found, expected, "{hundredths}");
             assert_eq!(crc32(&table), crc, "{hundredths}");
         }
         let all: Vec<u8> = (1..=1600)
-            .flat_map(|drop| table(Severity::hundredths(drop)))
+            .flat_map(|drop| table(Severity::from_hundredths(drop)))
             .collect();
         assert_eq!(crc32(&all), 0x2f73_04d1);
     }
@@ -326,7 +326,7 @@ mod tests {
         let clean = Rgb::new(16, 16, (0..768).map(|i| i as u8).collect()).unwrap();
         for level in Severity::LADDER
             .into_iter()
-            .chain([220, 440, 1333].map(Severity::hundredths))
+            .chain([220, 440, 1333].map(Severity::from_hundredths))
         {
             let table = table(level);
             let degraded = expose(&clean, level);

@@ -89,7 +89,7 @@ fn named_range(item: &str, first: &str, last: &str) -> Result<Vec<AxisLevel>, St
     if first.is_empty() {
         return Err(format!(
             "{item:?} is below 0; an exposure drop is a number of EV from 0 to {}",
-            LIGHT.largest()
+            LIGHT.max_severity()
         ));
     }
     if is_number(first) && is_number(last) {
@@ -166,7 +166,7 @@ fn stepped_range(item: &str, from: &str, rest: &str) -> Result<Vec<AxisLevel>, S
         .step_by(usize::from(step))
         .map(|severity| match severity {
             0 => AxisLevel::L0,
-            severity => AxisLevel::new(kind, Severity::hundredths(severity)),
+            severity => AxisLevel::new(kind, Severity::from_hundredths(severity)),
         })
         .collect())
 }
@@ -182,7 +182,7 @@ fn hundredths(item: &str, kind: Kind, number: &str) -> Result<u16, String> {
         ));
     }
     let level = parse_number(kind, number).map_err(|problem| format!("{item:?}: {problem}"))?;
-    Ok(level.severity().map_or(0, Severity::in_hundredths))
+    Ok(level.severity().map_or(0, Severity::hundredths))
 }
 
 /// Parses one level: a name, a number of EV, or an exposure time as T33.33.
@@ -215,11 +215,11 @@ fn parse_number(kind: Kind, number: &str) -> Result<AxisLevel, String> {
     }
     if number
         .parse()
-        .is_ok_and(|value: f64| value > kind.largest().value())
+        .is_ok_and(|value: f64| value > kind.max_severity().value())
     {
         return Err(format!(
             "{number:?} is above {} {}, the maximum",
-            kind.largest(),
+            kind.max_severity(),
             kind.axis().unit
         ));
     }

@@ -190,7 +190,7 @@ impl Settings {
             );
             return Err(PyValueError::new_err(problem));
         }
-        let largest = self.kind.largest().value();
+        let largest = self.kind.max_severity().value();
         if !(0.0..=largest).contains(&drop_ev) {
             return Err(PyValueError::new_err(format!(
                 "{name}: a number of EV from 0 to {largest} expected, got {drop_ev}"
@@ -198,7 +198,7 @@ impl Settings {
         }
         let hundredths = (100.0 * drop_ev).round() as u16;
         Ok(Level(
-            (hundredths > 0).then(|| Severity::hundredths(hundredths)),
+            (hundredths > 0).then(|| Severity::from_hundredths(hundredths)),
         ))
     }
 

@@ -104,7 +104,7 @@ fn curve(
     cells: &SeriesByLevel<'_, OpenCell>,
     style: LineStyle,
 ) -> PlotLine {
-    let clean = ladder.start(series).map(|cell| (AxisLevel::L0, cell));
+    let clean = ladder.l0_cell(series).map(|cell| (AxisLevel::L0, cell));
     let degraded = cells
         .iter()
         .map(|(level, cell)| (*level, *cell))

@@ -3,7 +3,7 @@
 use super::open_report::OpenReport;
 use crate::tables::{enhancers, reading, with_training};
 use crate::text::ladder::{Ladder, Series, SeriesByLevel};
-use crate::text::latex::escaped;
+use crate::text::latex::escape;
 use crate::text::table::ColumnKind::{Accuracy, Count, Points, Share, Text};
 use crate::text::table::SUMMARY;
 use crate::text::table::{ColumnKind, Table, TableBuilder, TableCell};
@@ -137,7 +137,7 @@ fn axis_table(report: &OpenReport<'_>, axis: Axis, ladder: &Ladder<'_, OpenCell>
     ));
     table.latex = Some(format!(
         "OpenEQA by LLM-Match in \\%{of} (marked by {}, protocol {protocol}), with the difference from L0; {} questions.",
-        escaped(judge),
+        escape(judge),
         report.questions.len()
     ));
     table

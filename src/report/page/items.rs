@@ -195,8 +195,8 @@ impl NoAnswerReason {
     fn text(self) -> String {
         match self {
             Self::None => String::new(),
-            Self::Unread(why) => outcome_words::unread(why).to_owned(),
-            Self::Failed(kind, status) => outcome_words::failed(kind, status),
+            Self::Unread(why) => outcome_words::unread_reason(why).to_owned(),
+            Self::Failed(kind, status) => outcome_words::failure_reason(kind, status),
         }
     }
 }

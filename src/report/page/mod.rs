@@ -34,7 +34,7 @@ use crate::text::alert::{Alert, AlertKind};
 use crate::text::noise_profiles::NoiseProfiles;
 use crate::text::table::Table;
 use crate::types::Truths;
-use crate::types::flags::spelled_setting;
+use crate::types::flags::setting_spelling;
 use crate::types::manifests::RunManifest;
 use darkqa_score::answers::confusion::Confusion;
 use darkqa_score::grid::Grid;
@@ -329,7 +329,7 @@ fn setting_facts(manifest: &RunManifest) -> Vec<(String, String)> {
         .identity
         .iter()
         .chain(&manifest.settings)
-        .map(|(name, value)| (spelled_setting(name), setting_text(value)));
+        .map(|(name, value)| (setting_spelling(name), setting_text(value)));
     platform
         .chain(settings)
         .chain(column_facts(manifest))
@@ -350,7 +350,7 @@ fn column_facts(manifest: &RunManifest) -> Vec<(String, String)> {
                 .into_iter()
                 .flatten()
                 .filter(|(_, value)| !value.is_null())
-                .map(|(name, value)| format!("{} {}", spelled_setting(name), setting_text(value)))
+                .map(|(name, value)| format!("{} {}", setting_spelling(name), setting_text(value)))
                 .collect();
             rows.push(fact(&format!("{column} {value}"), settings.join(", ")));
         }

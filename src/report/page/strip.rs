@@ -65,7 +65,7 @@ impl Strip {
         let thumbnails: Vec<&Thumbnail> = inputs
             .thumbnails
             .iter()
-            .filter(|thumbnail| thumbnail.condition.level().is_shown_on(Axis::LIGHT))
+            .filter(|thumbnail| thumbnail.condition.level().belongs_to(Axis::LIGHT))
             .collect();
         let Some(frame) = thumbnails.iter().map(|thumbnail| &thumbnail.frame).min() else {
             return Ok(None);
@@ -187,7 +187,7 @@ impl<'a> Row<'a> {
         let condition = &thumbnail.condition;
         condition.level() == level
             && condition.enhancer.as_ref() == self.enhancer
-            && (condition.kind_reading() == self.variant || level == AxisLevel::L0)
+            && (condition.variant() == self.variant || level == AxisLevel::L0)
     }
 }
 
@@ -200,7 +200,7 @@ fn rows<'a>(grid: &Grid<'_>, thumbnails: &[&'a Thumbnail]) -> Vec<Row<'a>> {
         .iter()
         .map(|thumbnail| {
             let condition = &thumbnail.condition;
-            (condition.kind_reading(), condition.enhancer.as_ref())
+            (condition.variant(), condition.enhancer.as_ref())
         })
         .filter(|(variant, _)| variant.is_degraded())
         .collect();

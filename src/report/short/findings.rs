@@ -9,7 +9,7 @@ use crate::text::alert::{Alert, lines};
 use crate::text::terminal::line;
 use crate::text::words::counted;
 use crate::text::wrapped::wrapped;
-use crate::types::text::shown;
+use crate::types::text::escape_hidden;
 
 /// Width of the column of group titles, in characters.
 const GROUP_WIDTH: usize = 15;
@@ -24,7 +24,7 @@ pub(in crate::report) fn findings(
 ) -> String {
     let mut text = match length {
         // As wide as the tables.
-        ReportLength::Full => line(["", head, " "]) + &lines(alerts),
+        ReportLength::Full => line("", head, " ") + &lines(alerts),
         _ => format!("{head}\n") + &alerts.iter().map(styled_lines::alert).collect::<String>(),
     };
     if groups.count() == 0 {
@@ -58,7 +58,7 @@ fn row(title: &str, finding: &Finding<'_>) -> String {
     let tone = finding.main_sentence().tone;
     let first = format!(" {title:<GROUP_WIDTH$}{}  ", tone.sign());
     let rest = " ".repeat(first.chars().count());
-    let lines = wrapped(&first, &shown(&(finding.text() + ".")), &rest);
+    let lines = wrapped(&first, &escape_hidden(&(finding.text() + ".")), &rest);
     let text = styled_lines::colour_sign(&lines, GROUP_WIDTH + 2, tone);
     let intervals = finding.intervals_text();
     if intervals.is_empty() {

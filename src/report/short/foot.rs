@@ -113,7 +113,7 @@ fn observer_control(report: &ChoiceReport<'_>) -> String {
 pub(super) fn about_models(report: &ChoiceReport<'_>, models: &[&str]) -> String {
     let listing = &report.findings.grid.listing;
     let mut text = listing
-        .foot(models.iter().copied())
+        .footnote(models.iter().copied())
         .map_or_else(String::new, |foot| wrapped(" ", &foot, "   "));
     for (enhancer, training) in listing.trainings() {
         text += &wrapped(" ", &format!("{enhancer}: {training}"), "   ");
@@ -123,7 +123,7 @@ pub(super) fn about_models(report: &ChoiceReport<'_>, models: &[&str]) -> String
             .columns()
             .iter()
             .map(|column| {
-                let fact = Some(listing.fact(*column, model)).filter(|fact| !fact.is_empty());
+                let fact = Some(listing.cell(*column, model)).filter(|fact| !fact.is_empty());
                 format!("{} {}", column.head(), fact.unwrap_or("–"))
             })
             .collect();

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::text::words::shortened;
+use crate::text::words::shorten_middle;
 
 /// Width of the column of a level, in characters.
 pub(super) const LEVEL_WIDTH: usize = 7;
@@ -21,7 +21,7 @@ impl NameColumn {
         let mut seen = BTreeSet::new();
         let ambiguous = names
             .into_iter()
-            .map(|name| shortened(name, width))
+            .map(|name| shorten_middle(name, width))
             .filter(|name| !seen.insert(name.clone()))
             .collect();
         Self { width, ambiguous }
@@ -37,7 +37,7 @@ impl NameColumn {
     ) -> String {
         let width = self.width;
         let mut text = String::new();
-        let mut short = shortened(name, width);
+        let mut short = shorten_middle(name, width);
         if self.ambiguous.contains(&short) {
             text = format!(" {name}\n");
             short.clear();

@@ -9,12 +9,12 @@ use super::foot::BELOW;
 use crate::sentences::{Sentence, Tone};
 use crate::text::alert::Alert;
 use crate::text::wrapped::wrapped;
-use crate::types::text::shown;
+use crate::types::text::escape_hidden;
 
 /// Wrapped text of an alert with its sign.
 pub(super) fn alert(alert: &Alert) -> String {
     style_start(
-        &wrapped("! ", &shown(&alert.text), "  "),
+        &wrapped("! ", &escape_hidden(&alert.text), "  "),
         1,
         colour(AnsiColor::Yellow),
     )
@@ -23,8 +23,9 @@ pub(super) fn alert(alert: &Alert) -> String {
 /// Wrapped text of a sentence with its sign, and its detail below.
 pub(super) fn sentence(sentence: &Sentence) -> String {
     let first = format!(" {}  ", sentence.tone.sign());
-    let text = wrapped(&first, &shown(&sentence.text), "    ");
-    colour_sign(&text, 2, sentence.tone) + &wrapped("    ", &shown(&sentence.detail), "    ")
+    let text = wrapped(&first, &escape_hidden(&sentence.text), "    ");
+    colour_sign(&text, 2, sentence.tone)
+        + &wrapped("    ", &escape_hidden(&sentence.detail), "    ")
 }
 
 /// Applies the colour of a tone to the first `end` characters, at the end of which the sign is.
@@ -39,7 +40,7 @@ pub(super) fn colour_sign(lines: &str, end: usize, tone: Tone) -> String {
 
 /// Summary of a report, in bold.
 pub(super) fn summary(text: &str) -> String {
-    let lines = wrapped(" ", &shown(text), " ");
+    let lines = wrapped(" ", &escape_hidden(text), " ");
     let style = Style::new().bold();
     format!("{style}{}{style:#}\n", lines.trim_end())
 }
@@ -52,7 +53,7 @@ pub(super) fn heading(title: &str) -> String {
 /// Applies red to the marks of accuracies below the accuracy without images in a table.
 pub(super) fn table(text: &str) -> String {
     let style = colour(AnsiColor::Red);
-    shown(text).replace(BELOW, &format!("{style}{BELOW}{style:#}"))
+    escape_hidden(text).replace(BELOW, &format!("{style}{BELOW}{style:#}"))
 }
 
 fn colour(colour: AnsiColor) -> Style {

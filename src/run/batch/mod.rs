@@ -67,7 +67,7 @@ fn report<D: Detail>(
     let mut run = StoredRun::reread(store.folder(), manifest)?;
     let trials = run.manifest.counts.trials.max(run.trials.len());
     let failed = run.trials.iter().map(TrialRef::failed);
-    run.manifest.count(Counts::new(trials, failed));
+    run.manifest.set_counts(Counts::new(trials, failed));
     let mut outcome = write(store, run, show.format())?;
     record_table::update(store.folder(), show.record_table())?;
     if !show.format().is_json() {

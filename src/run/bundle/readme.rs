@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use crate::runs::stored::{AnyRun, text_setting};
 use crate::types::flags::keyed_form;
 use crate::types::manifests::{RunManifest, judge_flag};
-use crate::types::text::shown;
+use crate::types::text::escape_hidden;
 use crate::types::{AxisLevel, Trials, shell_word};
 use darkqa_score::answers::record::Detail;
 
@@ -48,7 +48,7 @@ pub(super) fn readme(inputs: &ReadmeInputs<'_>) -> String {
     for (name, size) in inputs.files {
         let _ = writeln!(text, "| `{name}` | {size} |");
     }
-    shown(&text).into_owned()
+    escape_hidden(&text).into_owned()
 }
 
 /// Shell lines in a fenced code block, whose fence is longer than any in the lines.

@@ -116,7 +116,7 @@ pub(super) fn shown_questions(
                 .position(|&index| Some(index) == choices.truth());
             shown.push(ShownQuestion {
                 question: Question {
-                    choices: Choices::known_by(texts.collect(), truth)?,
+                    choices: Choices::with_truth(texts.collect(), truth)?,
                     ..question.clone()
                 },
                 repeat,

@@ -45,7 +45,7 @@ pub(super) fn power_forecast(
 
 /// The numbers of models, enhancers and lights of a run with these conditions.
 pub(super) fn run_contents(conditions: &[Condition], models: usize) -> RunContents {
-    let variants: BTreeSet<Variant> = conditions.iter().map(Condition::kind_reading).collect();
+    let variants: BTreeSet<Variant> = conditions.iter().map(Condition::variant).collect();
     let last = variants.iter().filter_map(|variant| variant.kind).max();
     let lights = variants.iter().filter(|variant| variant.kind == last);
     let base = last.and_then(Kind::base);

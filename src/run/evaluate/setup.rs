@@ -104,7 +104,11 @@ impl<'a> ChoiceSetup<'a> {
         photographs::print_darkness(&*dataset, &sources, progress);
         dark_already::print_note(job, progress);
         if !job.enhancers.is_empty()
-            && job.enhancers.on().and(TreatmentSet::DARK).is_none()
+            && job
+                .enhancers
+                .on()
+                .intersection(TreatmentSet::DARK)
+                .is_none()
             && !photographs::names(&sources).is_empty()
         {
             let line = "the photographs in the dark are not enhanced; --llie-on noise,dark enhances them too";

@@ -23,7 +23,7 @@ use crate::runs::Outcome;
 use crate::text::table::Table;
 use crate::types::Decides;
 use crate::types::manifests::Status;
-use crate::types::text::shown;
+use crate::types::text::escape_hidden;
 
 use width::{TEX, Width};
 
@@ -307,7 +307,7 @@ impl Files {
         }
         let captions = out.join(CAPTIONS);
         let text = self.captions + &self.left_out;
-        files::write(&captions, shown(&text).as_bytes())?;
+        files::write(&captions, escape_hidden(&text).as_bytes())?;
         let _ = writeln!(lines, "{}", captions.display());
         Ok(lines + &self.left_out)
     }

@@ -88,8 +88,8 @@ fn choice_answer(record: &Record) -> ShownAnswer {
         condition: record.condition.clone(),
         outcome: outcome_words::outcome(record),
         reply: reply_excerpt(record),
-        shown: record.detail.shown().clone(),
-        sent: record.detail.sent(),
+        shown: record.detail.sent_frame().clone(),
+        sent: record.detail.file_digest(),
     }
 }
 
@@ -109,7 +109,7 @@ fn open_answer(record: &Record<OpenDetail>) -> ShownAnswer {
         outcome: match (&record.failure, &record.detail.judged) {
             (Some(failure), _) => format!(
                 "failed ({})",
-                outcome_words::failed(failure.kind, failure.status)
+                outcome_words::failure_reason(failure.kind, failure.status)
             ),
             (None, Some(_)) => "marked".to_owned(),
             (None, None) => "answered".to_owned(),

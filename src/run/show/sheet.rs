@@ -167,7 +167,7 @@ impl SheetItem {
             let conditions = self.levels.iter().map(|level| {
                 self.asked_conditions()
                     .find(|condition| {
-                        let variant = condition.kind_reading();
+                        let variant = condition.variant();
                         condition.level() == *level
                             && condition.enhancer.as_ref() == enhancer
                             && (variant == self.curves.variant || variant == Variant::NONE)
@@ -215,7 +215,7 @@ impl SheetItem {
             .iter()
             .filter(|record| record.condition.as_ref() == Some(condition))
             .any(|record| {
-                let sent = record.detail.sent();
+                let sent = record.detail.file_digest();
                 sent.is_some() && sent != now
             })
     }

@@ -180,8 +180,8 @@ fn sent_digests(trials: &Trials<ChoiceDetail>) -> BTreeMap<(FrameId, Condition),
     trials
         .iter()
         .filter_map(|trial| {
-            let place = (trial.shown().clone(), trial.condition()?.clone());
-            Some((place, trial.sent()?))
+            let place = (trial.sent_frame().clone(), trial.condition()?.clone());
+            Some((place, trial.sent_digest()?))
         })
         .collect()
 }

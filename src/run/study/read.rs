@@ -130,7 +130,8 @@ pub(crate) fn read(args: &ReadArgs) -> Result<Outcome> {
     warn_of_no_choice(&counts.no_choice);
     let mut run = StoredRun::reread(&args.out, people_manifest)?;
     let failed = run.trials.iter().map(TrialRef::failed);
-    run.manifest.count(Counts::new(run.trials.len(), failed));
+    run.manifest
+        .set_counts(Counts::new(run.trials.len(), failed));
     let mut outcome = choice::write(&store, run, args.show.format())?;
     record_table::update(&args.out, args.show.record_table())?;
     if !args.show.format().is_json() {

@@ -65,7 +65,7 @@ pub(super) fn rounding_alert<D: Detail>(joined: &Joined<D>) -> Option<Alert> {
         .filter_map(Condition::degradation)
         .filter(|degradation| {
             matches!(degradation.kind(), Kind::Exposure | Kind::Sensor)
-                && degradation.severity().in_hundredths() > FEW_CODES
+                && degradation.severity().hundredths() > FEW_CODES
         })
         .map(Degradation::severity)
         .collect();

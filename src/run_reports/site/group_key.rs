@@ -61,11 +61,11 @@ impl GroupKey {
             let Some(condition) = trial.condition() else {
                 continue;
             };
-            let own = condition.kind_reading();
+            let own = condition.variant();
             if condition.enhancer.is_none() && (own.is_untouched() || own == *variant) {
                 levels.insert(condition.level());
                 let place = (trial.question().to_string(), condition.to_string());
-                images.entry(place).or_default().extend(trial.sent());
+                images.entry(place).or_default().extend(trial.sent_digest());
             }
         }
         let light = variant.title();
@@ -99,7 +99,7 @@ impl GroupKey {
             levels.insert(condition.level());
             if condition.enhancer.is_none() {
                 let place = (trial.question().to_string(), condition.to_string());
-                images.entry(place).or_default().extend(trial.sent());
+                images.entry(place).or_default().extend(trial.sent_digest());
             }
         }
         let [judge, protocol] = [JUDGE, PROTOCOL].map(|name| {

@@ -148,7 +148,7 @@ fn add_choices(
 fn compared_trials(combined: &Combined, variant: &Variant) -> Trials<ChoiceDetail> {
     let trials = combined.trials.iter().filter(|trial| {
         trial.condition().is_some_and(|condition| {
-            let own = condition.kind_reading();
+            let own = condition.variant();
             condition.enhancer.is_none() && (own.is_untouched() || own == *variant)
         })
     });

@@ -70,7 +70,7 @@ impl TableDetail for OpenDetail {
         let names = RecordedNames::from_manifest(manifest);
         let mut marks = MarkIndex::new(questions);
         each_record(folder, |record: Record<Self>, _| {
-            let is_of_judge = Some(names.shown(&record.model)) == judge.as_deref();
+            let is_of_judge = Some(names.table_name(&record.model)) == judge.as_deref();
             let detail = &record.detail;
             if let (Step::Mark, Some(answer)) = (detail.step, &detail.judged)
                 && is_of_judge

@@ -57,7 +57,7 @@ pub(super) fn ordered_places(
     let conditions = conditions.ranks(Clone::clone);
     let listing = ModelListing::new(manifest.models.iter().cloned());
     let models = models.ranks(|model| {
-        let model = names.shown(model);
+        let model = names.table_name(model);
         (listing.place(model), model.to_owned())
     });
     all.sort_unstable_by_key(|place| {

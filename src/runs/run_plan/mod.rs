@@ -21,7 +21,7 @@ use crate::images::frames::Source;
 use crate::runs::shard::Shard;
 use crate::runs::shard_sources::{WeightedSource, shard_range};
 use crate::store::PLAN;
-use crate::types::flags::spelled_setting;
+use crate::types::flags::setting_spelling;
 use crate::types::manifests::{Identity, differences};
 use crate::types::{Digest, FrameId, Question, RunQuestion, shell_word};
 
@@ -90,7 +90,7 @@ impl RunPlan {
             Some((field, planned, now)) => Err(self.error(format!(
                 "the plan is of another run: its {setting} is {planned}, now it is {now}; use the same {setting}, or another --out, or write the \
                  plan again with the new flags (`darkqa-eval plan`)",
-                setting = spelled_setting(field)
+                setting = setting_spelling(field)
             ))),
         }
     }

@@ -7,7 +7,7 @@ use super::stored_shard::{StoredShard, no_shard_error};
 use crate::error::{Error, Result};
 use crate::runs::shard_budget::ShardBudget;
 use crate::types::InputSummary;
-use crate::types::flags::spelled_setting;
+use crate::types::flags::setting_spelling;
 use crate::types::manifests::{RunManifest, differences};
 
 /// Checks that all shards belong to the same run.
@@ -36,10 +36,10 @@ pub(super) fn check_same_run(parts: &[StoredShard]) -> Result<()> {
 /// First difference by which two manifests belong to different runs: the field, and its value in each.
 fn difference(one: &RunManifest, other: &RunManifest) -> Option<(String, String, String)> {
     if let Some((field, first, second)) = differences(&one.identity, &other.identity).next() {
-        return Some((spelled_setting(field), first, second));
+        return Some((setting_spelling(field), first, second));
     }
     let column = one.column_differences(other).into_iter().next()?;
-    let setting = spelled_setting(&column.field);
+    let setting = setting_spelling(&column.field);
     let field = format!("{setting} of the {} {}", column.column, column.value);
     Some((field, column.first, column.second))
 }
@@ -62,13 +62,13 @@ pub(super) fn joined_manifest(parts: &[StoredShard], coverage: &Coverage) -> Res
     manifest.enhancers = BTreeMap::new();
     for (name, note) in parts.iter().flat_map(|part| &part.manifest.enhancers) {
         let earlier = manifest.enhancers.remove(name);
-        let note = note.clone().after(earlier);
+        let note = note.clone().with_earlier(earlier);
         manifest.enhancers.insert(name.clone(), note);
     }
     let mut inputs: Option<InputSummary> = None;
     for (part, is_counted) in parts.iter().zip(coverage.counted_once()) {
         if is_counted && let Some(part_inputs) = &part.manifest.inputs {
-            inputs.get_or_insert_default().join(part_inputs);
+            inputs.get_or_insert_default().merge(part_inputs);
         }
     }
     manifest.inputs = inputs;

@@ -70,7 +70,7 @@ impl<D: Detail> ShardedRun<D> {
         }
         sort_trials(&mut trials, questions.ids(), &manifest.models);
         let failed = trials.iter().filter(|trial| trial.failed()).count();
-        manifest.count(Counts {
+        manifest.set_counts(Counts {
             trials: coverage.trials().max(trials.len()),
             answered: trials.len() - failed,
             failed,

@@ -73,7 +73,7 @@ fn run_from_shards<D: Detail>(folder: &Path, parts: &[PathBuf]) -> Result<Stored
         layout: RunLayout::Shards,
         texts: RunTexts::Shards(texts?),
         thumbnails: store::missing_thumbnails(&[], &folders, |frame| wanted.wants(frame)),
-        fidelity: store::more_fidelity(&[], &folders, |_| true),
+        fidelity: store::missing_fidelity(&[], &folders, |_| true),
         left_out: Trials::default(),
         manifest: parts.manifest,
         trials: parts.trials,

@@ -19,7 +19,7 @@ pub(super) fn remove_duplicates<D: Detail>(
 ) -> Result<usize> {
     let mut logs = ShardLogs::new(folders);
     let mut paid_twice = 0;
-    trials.each_key_once(|first, later| {
+    trials.keep_one_per_key(|first, later| {
         if first.text().log() == later.text().log() {
             return Ok(first.or_later(later));
         }
@@ -50,7 +50,7 @@ fn check_images<D: Detail>(
         logs.record(places[0], &lines[0])?,
         logs.record(places[1], &lines[1])?,
     ];
-    let images = records.each_ref().map(|record| record.detail.shown());
+    let images = records.each_ref().map(|record| record.detail.sent_digest());
     if images[0] == images[1] || images.iter().any(Option::is_none) {
         return Ok(());
     }

@@ -41,7 +41,7 @@ impl ObserverCell {
     #[must_use]
     pub fn is_standing(&self) -> bool {
         Control::from_model_name(&self.subject.model)
-            .is_some_and(|control| Control::STANDING.contains(&control))
+            .is_some_and(|control| Control::DEFAULTS.contains(&control))
     }
 
     /// True if this is a control whose interval excludes chance, which invalidates the observer's results.
@@ -51,7 +51,7 @@ impl ObserverCell {
         let tolerance = 1e-9;
         let excludes_chance =
             self.score.low > self.chance + tolerance || self.score.high < self.chance - tolerance;
-        Control::from_model_name(&self.subject.model).is_some_and(Control::leaves_nothing)
+        Control::from_model_name(&self.subject.model).is_some_and(Control::removes_all_information)
             && excludes_chance
     }
 }
@@ -130,7 +130,7 @@ impl ObserverSummary {
     /// Results of the standing control over all conditions; one for each run that has its own.
     #[must_use]
     pub fn standing_controls(&self) -> Vec<&ObserverCell> {
-        Control::STANDING
+        Control::DEFAULTS
             .into_iter()
             .map(|standing| -> Vec<&ObserverCell> {
                 self.controls
@@ -151,7 +151,7 @@ impl ObserverSummary {
             .model
             .strip_prefix(OBSERVER)
             .unwrap_or_default();
-        Control::STANDING
+        Control::DEFAULTS
             .into_iter()
             .map(Control::model_name)
             .flat_map(|name| [format!("{name}{run}"), name])
@@ -207,7 +207,7 @@ fn cell(
     let max_weight = n as f64 / f64::max(evidence as f64, 1.0);
     Some(ObserverCell {
         subject,
-        score: Estimate::scored(&sums, max_weight, n)?,
+        score: Estimate::from_scores(&sums, max_weight, n)?,
         chance: guesses / n as f64,
         evidence: evidence as f64 / n as f64,
         seen: sum(|frame| frame.seen) as f64 / things,

@@ -99,7 +99,7 @@ impl ModelInCondition {
             model: model.to_owned(),
             view: Some(condition.map_or(View::Blind, |_| View::Image)),
             level: condition.map(Condition::level),
-            variant: condition.map_or(Variant::NONE, Condition::kind_reading),
+            variant: condition.map_or(Variant::NONE, Condition::variant),
             enhancer: condition.and_then(|condition| condition.enhancer.clone()),
         }
     }
@@ -139,7 +139,7 @@ impl ModelInCondition {
             && variant.reading == other_variant.reading
             && variant.pair == other_variant.pair
             && self.enhancer == other.enhancer
-            && RunGroup::meet(variant.group.as_ref(), other_variant.group.as_ref())
+            && RunGroup::overlap(variant.group.as_ref(), other_variant.group.as_ref())
     }
 
     /// Returns the same model and condition without its group of runs.

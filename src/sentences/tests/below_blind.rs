@@ -1,4 +1,4 @@
-//! Golden sentences about models that are less often right than without images.
+//! Expected sentences about models that are less often right with images than without.
 
 use super::{checked, finding};
 use crate::sentences::below_blind;
@@ -13,12 +13,14 @@ use darkqa_score::estimate::Estimate;
 use darkqa_score::significance::Significance::{self, Better, NotShown, Worse};
 use darkqa_score::subject::ModelInCondition;
 
-/// A model against words alone in a family.
-fn against_words(
-    (model, other): (&str, &str),
+/// A comparison of `model` with images and `other` without, in a family.
+fn against_blind(
+    model: &str,
+    other: &str,
     family: &Family,
     level: usize,
-    (difference, significance): (f64, Significance),
+    difference: f64,
+    significance: Significance,
 ) -> Comparison {
     let level = AxisLevel::new(Kind::Sensor, Severity::LADDER[level - 1]);
     let variant = Variant {
@@ -64,64 +66,57 @@ fn tested(difference: f64, significance: Significance) -> TestedComparison {
 }
 
 #[test]
-fn a_family_below_the_words_alone_is_said_once() {
+fn family_below_blind_is_reported_once() {
     let color = &Family::Color;
-    let own = ("sim-F", "sim-F");
     let one = [
-        against_words(own, color, 3, (-0.05, NotShown)),
-        against_words(own, color, 4, (-0.2, Worse)),
-        against_words(own, color, 5, (-0.3, Worse)),
-        against_words(("sim-A", "sim-A"), color, 5, (0.2, Better)),
-        against_words(own, &Family::RoomType, 5, (-0.25, Worse)),
+        against_blind("sim-F", "sim-F", color, 3, -0.05, NotShown),
+        against_blind("sim-F", "sim-F", color, 4, -0.2, Worse),
+        against_blind("sim-F", "sim-F", color, 5, -0.3, Worse),
+        against_blind("sim-A", "sim-A", color, 5, 0.2, Better),
+        against_blind("sim-F", "sim-F", &Family::RoomType, 5, -0.25, Worse),
     ];
-    let say = |all: &[Comparison], pooled: &[&PooledFinding]| {
-        let all: Vec<&Comparison> = all.iter().collect();
-        let said = below_blind::in_a_family(&all, pooled, ClusterUnit::Scene);
-        said.as_ref().map(checked)
-    };
     assert_eq!(
-        say(&one, &[]).unwrap(),
+        family_sentence(&one, &[]).unwrap(),
         "− Object colour: sim-F is less often right than without images at L4–L5. (sim-F at L5: −30.0 [−40.0, −20.0], p = 0.012; n = 45 in 24 scenes)"
     );
     let two = [
         &one[..],
-        &[against_words(("sim-B", "sim-B"), color, 5, (-0.2, Worse))],
+        &[against_blind("sim-B", "sim-B", color, 5, -0.2, Worse)],
     ];
-    let said = say(&two.concat(), &[]).unwrap();
+    let said = family_sentence(&two.concat(), &[]).unwrap();
     assert!(
         said.starts_with(
             "− Object colour: 2 of 3 models are less often right than without images. (sim-F at L5: "
         ),
         "{said}"
     );
-    // Without words of its own.
-    let other = [against_words(("sim-F", "c"), color, 5, (-0.3, Worse))];
-    let said = say(&other, &[]).unwrap();
+    // A model without blind replies of its own.
+    let other = [against_blind("sim-F", "c", color, 5, -0.3, Worse)];
+    let said = family_sentence(&other, &[]).unwrap();
     assert!(
         said.starts_with(
             "− Object colour: sim-F is less often right than c without images at L5. (sim-F at L5 against c: "
         ),
         "{said}"
     );
-    assert_eq!(say(&one[..1], &[]), None);
-    // The findings over all families say it of this model alone, of several models, or do not say it.
+    assert_eq!(family_sentence(&one[..1], &[]), None);
+    // The findings over all families are about several models, about this model alone, or not detected.
     let mut pooled = finding(PooledKind::Blind, 5, -0.2, Worse);
-    assert!(say(&one, &[&pooled]).is_some());
+    assert!(family_sentence(&one, &[&pooled]).is_some());
     pooled.models = vec!["sim-F".to_owned()];
-    assert_eq!(say(&one, &[&pooled]), None);
+    assert_eq!(family_sentence(&one, &[&pooled]), None);
     pooled.strict.p_report = Some(0.2);
-    assert!(say(&one, &[&pooled]).is_some());
+    assert!(family_sentence(&one, &[&pooled]).is_some());
+}
+
+fn family_sentence(all: &[Comparison], pooled: &[&PooledFinding]) -> Option<String> {
+    let all: Vec<&Comparison> = all.iter().collect();
+    let sentence = below_blind::in_a_family(&all, pooled, ClusterUnit::Scene);
+    sentence.as_ref().map(checked)
 }
 
 #[test]
-fn below_whose_words_is_said() {
-    let say = |models: &[&str], blind: &[&str]| {
-        let mut finding = finding(PooledKind::Blind, 5, -0.2, Worse);
-        let [models, blind] = [models, blind].map(|names| names.iter().map(|&n| n.to_owned()));
-        (finding.models, finding.blind_models) = (models.collect(), blind.collect());
-        let said = below_blind::pooled(&[&finding], ClusterUnit::Scene);
-        said.unwrap().text
-    };
+fn blind_side_is_named() {
     let rows: [(&[&str], &[&str], &str); 4] = [
         (
             &["a"],
@@ -145,6 +140,14 @@ fn below_whose_words_is_said() {
         ),
     ];
     for (models, blind, expected) in rows {
-        assert_eq!(say(models, blind), expected);
+        assert_eq!(pooled_text(models, blind), expected);
     }
+}
+
+fn pooled_text(models: &[&str], blind: &[&str]) -> String {
+    let mut finding = finding(PooledKind::Blind, 5, -0.2, Worse);
+    let [models, blind] = [models, blind].map(|names| names.iter().map(|&n| n.to_owned()));
+    (finding.models, finding.blind_models) = (models.collect(), blind.collect());
+    let sentence = below_blind::pooled(&[&finding], ClusterUnit::Scene);
+    sentence.unwrap().text
 }

@@ -1,4 +1,4 @@
-//! Golden sentences about what models know of their own sight.
+//! Expected sentences about the confidence of models.
 
 use super::checked;
 use crate::sentences::confidence::{Confidence, confidence};
@@ -18,7 +18,7 @@ fn around(value: f64) -> Estimate {
     }
 }
 
-/// A number that is detected if it is more than 5 points from 0.
+/// A tested number, detected if it is more than 5 points from 0.
 fn tested(value: f64) -> TestedConfidence {
     TestedConfidence {
         estimate: around(value),
@@ -27,7 +27,7 @@ fn tested(value: f64) -> TestedConfidence {
     }
 }
 
-/// A model's confidence and accuracy.
+/// The calibration of a model with this confidence and accuracy.
 fn calibration(confidence: f64, accuracy: f64) -> Calibration {
     let zero = around(0.0);
     Calibration {
@@ -58,18 +58,7 @@ fn calibration(confidence: f64, accuracy: f64) -> Calibration {
 }
 
 #[test]
-fn a_model_that_stays_sure_in_the_dark_is_said_to_not_know_it() {
-    let level = AxisLevel::new(Kind::Sensor, Severity::LADDER[4]);
-    let say = |models: &[(&str, &Calibration, Option<&Calibration>)]| {
-        let all = models.iter().map(|&(model, dark, clean)| Confidence {
-            model,
-            level,
-            dark,
-            clean,
-        });
-        let said = confidence(&all.collect::<Vec<_>>(), ClusterUnit::Scene);
-        said.as_ref().map(checked)
-    };
+fn overconfidence_in_the_dark_is_reported() {
     let clean = calibration(0.9, 0.88);
     let (blind, modest, always) = (
         calibration(0.85, 0.4),
@@ -77,12 +66,12 @@ fn a_model_that_stays_sure_in_the_dark_is_said_to_not_know_it() {
         calibration(0.95, 0.88),
     );
     assert_eq!(
-        say(&[("a", &blind, Some(&clean))]).unwrap(),
+        confidence_sentence(&[("a", &blind, Some(&clean))]).unwrap(),
         "− a does not know how little it sees at L5: its mean confidence is 85.0 %, and 40.0 % of its replies are right. \
          (confidence less accuracy: +45.0 [+40.0, +50.0] points, p < 0.001, +2.0 [−3.0, +7.0] at L0; n = 1,200 replies with probabilities)"
     );
-    // The one that is furthest off is named, with how many are.
-    let several = say(&[
+    // The most overconfident model is named, with the number of overconfident models.
+    let several = confidence_sentence(&[
         ("b", &modest, Some(&clean)),
         ("a", &blind, Some(&clean)),
         ("c", &modest, None),
@@ -92,18 +81,33 @@ fn a_model_that_stays_sure_in_the_dark_is_said_to_not_know_it() {
         several.starts_with("− a does not know") && several.contains("shown of 1 of 3 models"),
         "{several}"
     );
-    // Off by no more than at L0, or L0 was not asked: that is no matter of the dark.
+    // If overconfidence is not larger than at L0, or L0 was not asked, the sentence does not blame the dark.
     for clean in [Some(&clean), None] {
-        let said = say(&[("a", &always, clean)]).unwrap();
+        let said = confidence_sentence(&[("a", &always, clean)]).unwrap();
         assert!(
             said.starts_with("− At L5 a is surer than it is right: its mean confidence is 95.0 %"),
             "{said}"
         );
     }
-    let said = say(&[("b", &modest, Some(&clean))]).unwrap();
+    let said = confidence_sentence(&[("b", &modest, Some(&clean))]).unwrap();
     assert!(
         said.starts_with("· b was not detected to be surer than it is right at L5"),
         "{said}"
     );
-    assert_eq!(say(&[]), None);
+    assert_eq!(confidence_sentence(&[]), None);
+}
+
+fn confidence_sentence(models: &[(&str, &Calibration, Option<&Calibration>)]) -> Option<String> {
+    let level = AxisLevel::new(Kind::Sensor, Severity::LADDER[4]);
+    let all: Vec<Confidence<'_>> = models
+        .iter()
+        .map(|&(model, dark, clean)| Confidence {
+            model,
+            level,
+            dark,
+            clean,
+        })
+        .collect();
+    let sentence = confidence(&all, ClusterUnit::Scene);
+    sentence.as_ref().map(checked)
 }

@@ -1,9 +1,9 @@
-//! Golden sentences of each kind and verdict, and the check that each number in a sentence is one of its values.
+//! Expected sentences of each kind and verdict. Every number in a sentence must be one of its values ([`checked`]).
 
 mod below_blind;
 mod confidence;
 mod hallucination;
-mod made;
+mod records;
 mod simulation;
 
 use super::sentence::{Sentence, level_runs};
@@ -55,7 +55,7 @@ fn finding(
 /// The difference of a finding in a parsing.
 fn parsed(kind: PooledKind, difference: f64, verdict: Significance) -> PooledDifference {
     let holm = if verdict == NotShown { 0.062 } else { 0.0004 };
-    // The sign of the difference is that of the verdict, so that a rate that grows is worse.
+    // A loss has a negative difference, except for rates of false answers, which are worse if they grow.
     let is_loss = matches!(kind, PooledKind::Hallucination(_)) == (difference > 0.0);
     assert!(
         verdict != Worse || is_loss || difference == 0.0,
@@ -94,7 +94,7 @@ fn numbers(text: &str) -> Vec<f64> {
         .collect()
 }
 
-/// The sentence as one line; each number in it must be one of its values.
+/// The sentence as one line. Panics if a number in it is not one of its values.
 fn checked(sentence: &Sentence) -> String {
     let line = format!(
         "{} {} ({})",
@@ -114,26 +114,9 @@ fn checked(sentence: &Sentence) -> String {
 }
 
 #[test]
-fn each_kind_and_verdict_has_its_words() {
-    use PooledKind::{Blind, Darkness, Enhancer, Hallucination, Noise};
-    type Levels<'a> = &'a [(f64, Significance)];
-    let say = |kind: PooledKind, levels: Levels<'_>| -> Vec<String> {
-        let all = findings(kind, levels);
-        let all: Vec<&PooledFinding> = all.iter().collect();
-        let unit = ClusterUnit::Scene;
-        let sentences: Vec<Sentence> = match kind {
-            Darkness => {
-                let said = darkness::with_variant(&all, None, None, unit);
-                said.into_iter().collect()
-            }
-            Noise => pooled::noise(&all, &[], unit),
-            Enhancer => pooled::enhancers(&all, &[], unit),
-            Blind => below::pooled(&all, unit).into_iter().collect(),
-            Hallucination(_) => Vec::new(),
-        };
-        sentences.iter().map(checked).collect()
-    };
-    let said = say(
+fn each_kind_and_verdict_has_a_sentence() {
+    use PooledKind::{Blind, Darkness, Enhancer, Noise};
+    let said = level_sentences(
         Darkness,
         &[(-0.02, NotShown), (-0.1, Worse), (-0.449, Worse)],
     );
@@ -144,7 +127,7 @@ fn each_kind_and_verdict_has_its_words() {
           shown at L2–L3; n = 1,237 in 30 scenes)"
         ]
     );
-    let said = say(Darkness, &[(-0.02, NotShown), (-0.01, NotShown)]);
+    let said = level_sentences(Darkness, &[(-0.02, NotShown), (-0.01, NotShown)]);
     assert_eq!(
         said,
         [
@@ -152,30 +135,30 @@ fn each_kind_and_verdict_has_its_words() {
           models: −1.0 [−5.0, +3.0], p = 0.062; at L2; n = 1,237 in 30 scenes)"
         ]
     );
-    let said = say(Darkness, &[(0.1, Better)]);
+    let said = level_sentences(Darkness, &[(0.1, Better)]);
     assert!(said[0].starts_with("+ At L1 accuracy is 10.0 points higher than at L0. ("));
-    let said = say(Noise, &[(-0.05, Worse), (-0.091, Worse), (0.01, NotShown)]);
+    let said = level_sentences(Noise, &[(-0.05, Worse), (-0.091, Worse), (0.01, NotShown)]);
     assert!(said[0].starts_with(
         "− With noise, accuracy is up to 9.1 points lower than by the exposure drop alone (L2). ("
     ));
     assert!(said[0].contains("; shown at L1–L2;"), "{said:?}");
-    let said = say(Noise, &[(-0.05, Worse), (-0.02, NotShown)]);
+    let said = level_sentences(Noise, &[(-0.05, Worse), (-0.02, NotShown)]);
     assert!(said[0].starts_with(
         "− With noise, accuracy is 5.0 points lower than by the exposure drop alone (L1). ("
     ));
-    // Both verdicts are said.
-    let said = say(Noise, &[(-0.644, Worse), (0.0, NotShown), (0.644, Better)]);
+    // Both verdicts are reported.
+    let said = level_sentences(Noise, &[(-0.644, Worse), (0.0, NotShown), (0.644, Better)]);
     assert_eq!(said.len(), 2, "{said:?}");
     assert!(said[0].starts_with("− With noise, accuracy is 64.4 points lower than"));
     assert!(said[1].starts_with("+ With noise, accuracy is 64.4 points higher than"));
     assert!(said[1].contains("; shown at L3;"), "{said:?}");
-    assert!(say(Noise, &[(-0.5, TooFewClusters)]).is_empty());
-    assert!(say(Darkness, &[(-1.0, TooFewClusters)]).is_empty());
-    let said = say(Noise, &[(0.03, NotShown)]);
+    assert!(level_sentences(Noise, &[(-0.5, TooFewClusters)]).is_empty());
+    assert!(level_sentences(Darkness, &[(-1.0, TooFewClusters)]).is_empty());
+    let said = level_sentences(Noise, &[(0.03, NotShown)]);
     assert!(said[0].starts_with(
         "· No difference in accuracy between noise and the exposure drop alone was detected. ("
     ));
-    let said = say(
+    let said = level_sentences(
         Enhancer,
         &[
             (-0.081, Worse),
@@ -195,7 +178,7 @@ fn each_kind_and_verdict_has_its_words() {
     for (said, start) in said.iter().zip(starts) {
         assert!(said.starts_with(start), "{said}");
     }
-    let said = say(
+    let said = level_sentences(
         Enhancer,
         &[
             (-0.081, Worse),
@@ -207,8 +190,8 @@ fn each_kind_and_verdict_has_its_words() {
     );
     assert!(said[0].starts_with("− lift harms at L1, by 8.1 points. ("));
     assert!(said[1].starts_with("+ lift helps at L2, L4–L5, by up to 22.0 points. ("));
-    assert!(say(Blind, &[(0.2, Better), (0.0, NotShown)]).is_empty());
-    let said = say(Blind, &[(0.2, Better), (-0.1, Worse)]);
+    assert!(level_sentences(Blind, &[(0.2, Better), (0.0, NotShown)]).is_empty());
+    let said = level_sentences(Blind, &[(0.2, Better), (-0.1, Worse)]);
     assert!(
         said[0].starts_with(
             "− In the dark the models are less often right than without images at L2. ("
@@ -216,8 +199,24 @@ fn each_kind_and_verdict_has_its_words() {
     );
 }
 
+fn level_sentences(kind: PooledKind, levels: &[(f64, Significance)]) -> Vec<String> {
+    let all = findings(kind, levels);
+    let all: Vec<&PooledFinding> = all.iter().collect();
+    let unit = ClusterUnit::Scene;
+    let sentences: Vec<Sentence> = match kind {
+        PooledKind::Darkness => darkness::with_variant(&all, None, None, unit)
+            .into_iter()
+            .collect(),
+        PooledKind::Noise => pooled::noise(&all, &[], unit),
+        PooledKind::Enhancer => pooled::enhancers(&all, &[], unit),
+        PooledKind::Blind => below::pooled(&all, unit).into_iter().collect(),
+        PooledKind::Hallucination(_) => Vec::new(),
+    };
+    sentences.iter().map(checked).collect()
+}
+
 #[test]
-fn an_effect_whose_interval_excludes_zero_is_called_unconfirmed() {
+fn undetected_effects_may_be_unconfirmed() {
     let unit = ClusterUnit::Scene;
     let all = findings(PooledKind::Darkness, &[(-0.05, NotShown)]);
     let all: Vec<&PooledFinding> = all.iter().collect();
@@ -238,7 +237,7 @@ fn an_effect_whose_interval_excludes_zero_is_called_unconfirmed() {
 }
 
 /// Findings about L1–L5 without a verdict, and the mean of L4–L5 with one.
-fn shown_by_mean(
+fn detected_by_mean(
     kind: PooledKind,
     difference: f64,
     verdict: Significance,
@@ -252,22 +251,8 @@ fn shown_by_mean(
 }
 
 #[test]
-fn a_mean_of_levels_is_named_if_no_level_is_shown_alone() {
-    let say = |kind: PooledKind, difference: f64, verdict: Significance| -> Vec<String> {
-        let [levels, means] = shown_by_mean(kind, difference, verdict);
-        let [levels, means] =
-            [&levels, &means].map(|all| all.iter().collect::<Vec<&PooledFinding>>());
-        let unit = ClusterUnit::Scene;
-        let sentences: Vec<Sentence> = match kind {
-            PooledKind::Darkness => darkness::with_variant(&levels, Some(means[0]), None, unit)
-                .into_iter()
-                .collect(),
-            PooledKind::Noise => pooled::noise(&levels, &means, unit),
-            _ => pooled::enhancers(&levels, &means, unit),
-        };
-        sentences.iter().map(checked).collect()
-    };
-    let helps = say(PooledKind::Enhancer, 0.05, Better);
+fn means_are_reported_without_a_detected_level() {
+    let helps = mean_sentences(PooledKind::Enhancer, 0.05, Better);
     assert!(
         helps[0].starts_with(
             "+ lift helps at L4–L5, by 5.0 points on average. (mean of these 2 models: +5.0 ["
@@ -278,73 +263,94 @@ fn a_mean_of_levels_is_named_if_no_level_is_shown_alone() {
         helps[1].starts_with("· lift at L1–L3: no effect detected. ("),
         "{helps:?}"
     );
-    let costs = say(PooledKind::Darkness, -0.05, Worse);
+    let costs = mean_sentences(PooledKind::Darkness, -0.05, Worse);
     assert!(
         costs.len() == 1
             && costs[0].starts_with("− Darkness costs 5.0 points on average over L4–L5, from "),
         "{costs:?}"
     );
-    let noise = say(PooledKind::Noise, -0.05, Worse);
+    let noise = mean_sentences(PooledKind::Noise, -0.05, Worse);
     assert!(
         noise.len() == 1
             && noise[0].starts_with("− With noise, accuracy is 5.0 points lower on average than by the exposure drop alone (L4–L5). ("),
         "{noise:?}"
     );
     // A mean without a verdict changes nothing.
-    let none = say(PooledKind::Enhancer, 0.05, NotShown);
+    let none = mean_sentences(PooledKind::Enhancer, 0.05, NotShown);
     assert!(
         none.len() == 1 && none[0].starts_with("· lift at L1–L5: no effect detected. ("),
         "{none:?}"
     );
 }
 
+fn mean_sentences(kind: PooledKind, difference: f64, verdict: Significance) -> Vec<String> {
+    let [levels, means] = detected_by_mean(kind, difference, verdict);
+    let [levels, means] = [&levels, &means].map(|all| all.iter().collect::<Vec<&PooledFinding>>());
+    let unit = ClusterUnit::Scene;
+    let sentences: Vec<Sentence> = match kind {
+        PooledKind::Darkness => darkness::with_variant(&levels, Some(means[0]), None, unit)
+            .into_iter()
+            .collect(),
+        PooledKind::Noise => pooled::noise(&levels, &means, unit),
+        _ => pooled::enhancers(&levels, &means, unit),
+    };
+    sentences.iter().map(checked).collect()
+}
+
 #[test]
 fn the_observer_confirms_less() {
-    let say = |model: &str, levels: &[(f64, Significance)]| {
-        let mut all = findings(PooledKind::Enhancer, levels);
-        for finding in &mut all {
-            finding.models = vec![model.to_owned()];
-        }
-        let all: Vec<&PooledFinding> = all.iter().collect();
-        let said = pooled::enhancers(&all, &[], ClusterUnit::Scene);
-        said.iter().map(checked).collect::<Vec<String>>()
-    };
-    // Of several runs, the name has the run.
-    let said = say("observer (a)", &[(-0.088, Worse), (-0.08, Worse)]);
+    // In a report on several runs, the name contains the run.
+    let said = enhancer_sentences("observer (a)", &[(-0.088, Worse), (-0.08, Worse)]);
     assert!(
         said[0]
             .starts_with("− With lift the observer confirms less at L1–L2, by up to 8.8 points. ("),
         "{said:?}"
     );
-    let said = say("observer", &[(0.03, Better)]);
+    let said = enhancer_sentences("observer", &[(0.03, Better)]);
     assert!(
         said[0].starts_with("+ With lift the observer confirms more at L1, by 3.0 points. ("),
         "{said:?}"
     );
 }
 
+fn enhancer_sentences(model: &str, levels: &[(f64, Significance)]) -> Vec<String> {
+    let mut all = findings(PooledKind::Enhancer, levels);
+    for finding in &mut all {
+        finding.models = vec![model.to_owned()];
+    }
+    let all: Vec<&PooledFinding> = all.iter().collect();
+    pooled::enhancers(&all, &[], ClusterUnit::Scene)
+        .iter()
+        .map(checked)
+        .collect()
+}
+
 #[test]
-fn how_far_intervals_reach_is_a_range() {
-    let say = |halves: &[f64]| {
-        let mut all = findings(PooledKind::Darkness, &vec![(-0.129, Worse); halves.len()]);
-        for (finding, half) in all.iter_mut().zip(halves) {
-            let difference = &mut finding.strict.difference;
-            (difference.low, difference.high) = (-0.129 - half, -0.129 + half);
-        }
-        let said = sample::power(&all, ClusterUnit::Scene);
-        said.as_ref().map(checked)
-    };
+fn interval_widths_are_a_range() {
     assert_eq!(
-        say(&[0.0614, 0.139, 0.08]).unwrap(),
+        power_sentence(&[0.0614, 0.139, 0.08]).unwrap(),
         "· With 30 scenes the intervals of the findings reach about 6 to 14 points to each side. (over all families; an effect much \
          smaller than that cannot be shown with so small a sample)"
     );
     assert_eq!(
-        say(&[0.061, 0.064]).unwrap(),
+        power_sentence(&[0.061, 0.064]).unwrap(),
         "· With 30 scenes the intervals of the findings reach about 6 points to each side. (over all families; an effect much smaller \
          than that cannot be shown with so small a sample)"
     );
-    assert_eq!(say(&[0.01, 0.049]), None);
+    assert_eq!(power_sentence(&[0.01, 0.049]), None);
+}
+
+fn power_sentence(half_widths: &[f64]) -> Option<String> {
+    let mut all = findings(
+        PooledKind::Darkness,
+        &vec![(-0.129, Worse); half_widths.len()],
+    );
+    for (finding, half) in all.iter_mut().zip(half_widths) {
+        let difference = &mut finding.strict.difference;
+        (difference.low, difference.high) = (-0.129 - half, -0.129 + half);
+    }
+    let sentence = sample::power(&all, ClusterUnit::Scene);
+    sentence.as_ref().map(checked)
 }
 
 #[test]
@@ -363,7 +369,7 @@ fn one_model_and_lost_items_are_named() {
 }
 
 #[test]
-fn levels_are_joined_by_runs() {
+fn neighbouring_levels_become_a_range() {
     let all = ["L1", "L2", "L3", "L4", "L5"];
     assert_eq!(level_runs(&["L1", "L2", "L4"], &all), "L1–L2, L4");
     assert_eq!(level_runs(&all, &all), "L1–L5");
@@ -371,7 +377,7 @@ fn levels_are_joined_by_runs() {
 }
 
 #[test]
-fn no_sentence_says_more_than_its_test() {
+fn sentences_never_claim_equality() {
     let source = [
         include_str!("../darkness.rs"),
         include_str!("../pooled.rs"),

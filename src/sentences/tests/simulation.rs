@@ -1,4 +1,4 @@
-//! Simulated runs with known truth: how often sentences claim what is not there, and how often they find what is.
+//! Simulated runs with known effects: the rates of false claims and of detected effects.
 
 use std::fmt::Write as _;
 
@@ -6,7 +6,7 @@ use rand::rngs::StdRng;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_distr::{Distribution, StandardNormal};
 
-use super::made::unanswered;
+use super::records::unanswered;
 use crate::sentences::{Sentence, Tone, sentences};
 use crate::types::{
     AnswerReading, ChoiceDetail, Condition, Digest, Family, FrameId, OptionProbabilities,
@@ -20,7 +20,7 @@ use darkqa_score::grid::Grid;
 use darkqa_score::significance::Significance;
 use darkqa_score::subject::ModelInCondition;
 
-/// The questions of a simulated run, and the truth.
+/// The design of a simulated run, and its true effects.
 #[derive(Debug, Clone, Copy)]
 struct Design {
     models: usize,
@@ -32,7 +32,7 @@ struct Design {
     gain: f64,
     /// Share of right replies that L4 and L5 with noise take away.
     loss: f64,
-    /// Whether the second half of the models are the first half, asked again.
+    /// True if the second half of the models are the first half, asked again.
     twins: bool,
 }
 
@@ -51,15 +51,16 @@ const QUESTIONS: [(Family, &[&str]); 4] = [
 ];
 
 impl Design {
-    /// The conditions of each model; an empty name is without images.
+    /// The conditions of each model; the empty name stands for no images.
     fn conditions(&self) -> Vec<String> {
         let mut all = vec![String::new(), "L0".to_owned()];
         for level in 1..=5 {
             all.push(format!("L{level}-ev"));
             for profile in &PROFILES[..self.profiles] {
                 all.push(format!("L{level}-noise{profile}"));
-                let enhancers = 0..self.enhancers;
-                all.extend(enhancers.map(|number| format!("L{level}-noise{profile}+e{number}")));
+                for number in 0..self.enhancers {
+                    all.push(format!("L{level}-noise{profile}+e{number}"));
+                }
             }
         }
         all
@@ -104,15 +105,13 @@ impl Design {
         records
     }
 
-    /// Gives all records new answers. Items, frames and models differ; conditions differ by a frame's luck and, for three answers of
-    /// ten, by a new draw; on average only by [`Design::effect`]. The confidence of a reply is the true probability that it is right.
+    /// Draws new answers for all records. Items, frames and models have random difficulties. Conditions differ by a random effect of each
+    /// frame and by a new draw for 30 % of the answers, and on average only by [`Design::effect`]. The confidence of a reply is the true
+    /// probability that it is right.
     fn answer(&self, random: &mut StdRng, records: &mut [Record]) {
         let items = 4 * self.frames;
-        let mut normals = |count: usize, spread: f64| -> Vec<f64> {
-            let mut normal = || -> f64 { StandardNormal.sample(random) };
-            (0..count).map(|_| spread * normal()).collect()
-        };
-        let (frames, difficulties) = (normals(self.frames, 0.5), normals(items, 0.8));
+        let frames = normals(random, self.frames, 0.5);
+        let difficulties = normals(random, items, 0.8);
         let conditions = self.conditions();
         let different = if self.twins {
             self.models / 2
@@ -122,16 +121,14 @@ impl Design {
         let models: Vec<(f64, Vec<f64>)> = (0..different)
             .map(|_| {
                 let skill = 1.2 + 0.3 * Distribution::<f64>::sample(&StandardNormal, random);
-                let fixed = (0..items).map(|_| random.random_range(0.0..1.0));
-                (skill, fixed.collect())
+                let fixed = (0..items).map(|_| random.random_range(0.0..1.0)).collect();
+                (skill, fixed)
             })
             .collect();
         for (number, of_model) in records.chunks_mut(conditions.len() * items).enumerate() {
             let (skill, fixed) = &models[number % different];
             for (name, answers) in conditions.iter().zip(of_model.chunks_mut(items)) {
-                let luck: Vec<f64> = (0..self.frames)
-                    .map(|_| 0.3 * Distribution::<f64>::sample(&StandardNormal, random))
-                    .collect();
+                let luck = normals(random, self.frames, 0.3);
                 for (item, record) in answers.iter_mut().enumerate() {
                     let frame = item / 4;
                     let logit = skill + frames[frame] + difficulties[item] + luck[frame];
@@ -147,6 +144,13 @@ impl Design {
             }
         }
     }
+}
+
+/// Normal random numbers with mean 0 and this standard deviation.
+fn normals(random: &mut StdRng, count: usize, deviation: f64) -> Vec<f64> {
+    (0..count)
+        .map(|_| deviation * Distribution::<f64>::sample(&StandardNormal, random))
+        .collect()
 }
 
 /// Sets an answer that is right with probability `p`, by a draw between 0 and 1.
@@ -169,7 +173,7 @@ fn set_answer(detail: &mut ChoiceDetail, p: f64, drawn: f64) {
     } else {
         TrialOutcome::Wrong
     };
-    // A model that is less sure than of the other choices together would have chosen another one.
+    // A model with less than half of the probability could have chosen another answer.
     let confidence = p.clamp(0.51, 0.99);
     let rest = (1.0 - confidence) / (choices - 1) as f64;
     let mut probabilities = vec![rest; choices];
@@ -183,7 +187,7 @@ fn set_answer(detail: &mut ChoiceDetail, p: f64, drawn: f64) {
     });
 }
 
-/// Whether a sentence claims an effect.
+/// True if a sentence claims an effect.
 fn is_claim(sentence: &Sentence) -> bool {
     matches!(sentence.tone, Tone::Better | Tone::Worse) || sentence.kind == "collapse"
 }
@@ -221,13 +225,15 @@ fn simulate(design: &Design, runs: usize, seed: u64) -> Counts {
         for claim in &claims {
             *counts.kinds.entry(claim.kind).or_default() += 1;
         }
-        let whole = || {
-            findings
-                .pooled
-                .iter()
-                .filter(|finding| finding.family.as_ref() == finding.kind.only_family())
-        };
-        counts.own += usize::from(whole().any(|finding| finding.strict.verdict.is_shown()));
+        let whole = findings
+            .pooled
+            .iter()
+            .filter(|finding| finding.family.as_ref() == finding.kind.only_family());
+        counts.own += usize::from(
+            whole
+                .clone()
+                .any(|finding| finding.strict.verdict.is_shown()),
+        );
         let is_decided = findings
             .by_reading
             .iter()
@@ -248,13 +254,16 @@ fn simulate(design: &Design, runs: usize, seed: u64) -> Counts {
             ),
         ] {
             let sign = Tone::from(verdict);
-            let mut own = whole().filter(|finding| finding.kind == kind);
             found[0] += usize::from(
                 claims
                     .iter()
                     .any(|claim| claim.kind == name && claim.tone == sign),
             );
-            found[1] += usize::from(own.any(|finding| finding.strict.verdict == verdict));
+            found[1] += usize::from(
+                whole
+                    .clone()
+                    .any(|finding| finding.kind == kind && finding.strict.verdict == verdict),
+            );
         }
     }
     counts
@@ -268,8 +277,10 @@ fn percent(count: usize, runs: usize) -> String {
 }
 
 fn runs() -> usize {
-    let runs = std::env::var("DARKQA_RUNS").ok();
-    runs.and_then(|runs| runs.parse().ok()).unwrap_or(300)
+    std::env::var("DARKQA_RUNS")
+        .ok()
+        .and_then(|runs| runs.parse().ok())
+        .unwrap_or(300)
 }
 
 /// The numbers of models to simulate: those in `DARKQA_MODELS`, separated by commas, or all.
@@ -368,7 +379,7 @@ fn effects_are_found() {
     }
 }
 
-/// Share of unchanged sets of models in which some model is called worse than in the old run.
+/// Number of simulated comparisons of unchanged models in which a model is called worse than in the old run.
 fn false_alarms(models: usize, conditions: usize, runs: usize) -> usize {
     let design = Design {
         models: 2 * models,
@@ -388,10 +399,11 @@ fn false_alarms(models: usize, conditions: usize, runs: usize) -> usize {
     (0..runs)
         .filter(|_| {
             design.answer(&mut random, &mut records);
-            let asked = records
+            let trials = records
                 .iter()
-                .filter(|record| kept.contains(&record.condition));
-            let trials = asked.cloned().collect();
+                .filter(|record| kept.contains(&record.condition))
+                .cloned()
+                .collect();
             let units = Clusters::new(asked_pairs(&records), &FrameTies::default());
             let grid = Grid::new(&trials, &units);
             let pairs = grid

@@ -1,11 +1,11 @@
-//! How well a number tells right from wrong replies: [`PairCounts`], the area under the receiver operating characteristic (AUC)
-//! with clustered replies.
+//! The area under the receiver operating characteristic (AUC) for clustered replies: how well a number predicts right replies
+//! ([`PairCounts`]).
 
 use super::estimate::Estimate;
 use super::quantiles::{degrees_of_freedom, student};
 use statrs::distribution::{ContinuousCDF as _, StudentsT};
 
-/// Minimum number of clusters for an interval (chosen): with fewer, their spread is estimated too poorly.
+/// Minimum number of clusters for an interval (chosen): with fewer, the variance estimate is too poor.
 const MIN_CLUSTERS: usize = 8;
 
 /// Minimum number of right and of wrong replies for an interval (chosen).
@@ -14,7 +14,7 @@ const MIN_REPLIES: usize = 10;
 /// A reply with the number that may predict it.
 #[derive(Debug, Clone, Copy)]
 pub struct RankedReply {
-    /// Index of its cluster.
+    /// Index of the reply's cluster.
     pub cluster: u32,
     /// The number, for example the fidelity of the image.
     pub number: f64,
@@ -24,11 +24,11 @@ pub struct RankedReply {
 /// Pairs of a right and a wrong reply of one stratum, summed over strata.
 ///
 /// A pair is concordant if the right reply has the higher number; ties count half. The share of concordant pairs is the AUC
-/// (Hanley and McNeil 1982, Radiology 143:29). Its variance is that between clusters: each cluster's pairs with all others are its
-/// influence (Obuchowski 1997, Biometrics 53:567), as the replies of a cluster are not independent.
+/// (Hanley and McNeil 1982, Radiology 143:29). Because the replies of a cluster are not independent, the variance is computed between
+/// clusters, from the pairs of each cluster with all replies (Obuchowski 1997, Biometrics 53:567).
 #[derive(Debug, Clone)]
 pub struct PairCounts {
-    /// Concordant pairs and all pairs of each cluster, counted on the side of either reply.
+    /// Concordant pairs and all pairs of each cluster. A pair counts in the cluster of each of its two replies.
     clusters: Vec<[f64; 2]>,
     concordant: f64,
     pairs: f64,
@@ -41,7 +41,7 @@ pub struct PairCounts {
 pub struct Auc {
     /// Share of concordant pairs, with its interval; `n` is the number of replies.
     pub estimate: Estimate,
-    /// Two-sided p-value of the hypothesis that the AUC is ½, by Student's t.
+    /// Two-sided p-value of the hypothesis that the AUC is ½, from Student's t.
     pub p: f64,
 }
 
@@ -124,20 +124,23 @@ impl PairCounts {
         let logit = libm::log(value / (1.0 - value));
         let degrees = degrees_of_freedom(&influences);
         let half = student(degrees) * error / slope;
-        let at = |logit: f64| 1.0 / (1.0 + libm::exp(-logit));
         let distribution = StudentsT::new(0.0, 1.0, degrees).ok()?;
-        // The same scale as the interval, so that it leaves out ½ exactly if p is below 0.05.
+        // Computed on the scale of the interval, so that the interval excludes ½ exactly if p is below 0.05.
         let p = 2.0 * distribution.sf(logit.abs() * slope / error);
         Some(Auc {
             estimate: Estimate {
                 value,
-                low: at(logit - half),
-                high: at(logit + half),
+                low: logistic(logit - half),
+                high: logistic(logit + half),
                 n: self.right + self.wrong,
             },
             p: p.min(1.0),
         })
     }
+}
+
+fn logistic(logit: f64) -> f64 {
+    1.0 / (1.0 + libm::exp(-logit))
 }
 
 #[cfg(test)]
@@ -154,16 +157,16 @@ mod tests {
             .collect()
     }
 
-    /// Replies of `clusters` clusters with eight each; a step of the golden ratio spreads their numbers evenly.
+    /// Eight replies in each of `clusters` clusters. Multiples of the golden ratio spread their numbers evenly.
     fn spread(clusters: u32, slope: f64) -> Vec<RankedReply> {
-        let number = |i: u32| (f64::from(i) * 0.618_033_988_749_895).fract();
         replies(
             &(0..clusters)
                 .flat_map(|cluster: u32| {
                     (0..8).map(move |i| {
                         let place = 8 * cluster + i;
                         let right = place.is_multiple_of(2);
-                        let number = number(place) + if right { slope } else { 0.0 };
+                        let spread = (f64::from(place) * 0.618_033_988_749_895).fract();
+                        let number = spread + if right { slope } else { 0.0 };
                         (cluster, number, right)
                     })
                 })
@@ -178,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn pairs_are_counted_as_by_hand() {
+    fn pair_counts_match_a_manual_count() {
         let mut counts = PairCounts::new(2);
         // Right: 1, 2, 3; wrong: 0, 2. Pairs: 1>0, 2>0, 3>0, 3>2 are concordant, 2=2 is tied, 1<2 is not.
         counts.add(&mut replies(&[
@@ -200,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn a_number_that_tells_right_from_wrong_is_found_and_noise_is_not() {
+    fn predictive_numbers_are_detected() {
         let none = auc(&spread(20, 0.0), 20).unwrap();
         assert!(
             (none.estimate.value - 0.5).abs() < 0.05 && none.p > 0.05,
@@ -215,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn the_same_replies_in_more_conditions_are_no_more_evidence() {
+    fn repeated_strata_add_no_evidence() {
         let mut once = PairCounts::new(12);
         once.add(&mut spread(12, 0.2));
         let mut pooled = once.clone();

@@ -9,26 +9,26 @@ use super::split_mix::SplitMix;
 const DRAWS: usize = 2000;
 /// Seed of the draws (chosen). It is fixed, so that the same records give the same intervals.
 const SEED: u64 = 0x6461_726b_7161;
-/// The most units that are drawn (chosen): a standard error is then exact to 1 % for itself. With more clusters, several of them are
-/// one unit, so that time and memory do not grow with the clusters.
-const MOST_UNITS: usize = 8192;
+/// Maximum number of units that are drawn (chosen): the standard error then has a relative error of 1 %. With more clusters, a unit is a
+/// group of clusters, so that time and memory do not grow further.
+const MAX_UNITS: usize = 8192;
 
 /// Draws of all clusters with replacement. Every statistic uses the same draws, so that differences are paired.
 ///
-/// With more than [`MOST_UNITS`] clusters, random groups of them are drawn in their place, each of the same number of clusters but the
-/// last. As the clusters are independent, so are the groups, and the variance of a sum over groups is that of the sum over clusters
-/// (the method of random groups: Wolter 2007, Introduction to Variance Estimation, chapter 2).
+/// With more than [`MAX_UNITS`] clusters, random groups of clusters are drawn instead. All groups except the last have the same number of
+/// clusters. Groups of independent clusters are independent too, and a sum over groups has the variance of the sum over clusters (the
+/// method of random groups: Wolter 2007, Introduction to Variance Estimation, chapter 2).
 #[derive(Debug)]
 pub struct Resamples {
-    /// The unit of each cluster that is drawn with it.
+    /// The index of each cluster's unit.
     units: Vec<u16>,
     /// Number of units.
     count: usize,
-    /// Number of times that each unit occurs in each draw, draw by draw.
+    /// Number of occurrences of each unit, one draw after the other.
     times: Vec<u8>,
 }
 
-/// One draw: how many times each cluster occurs in it.
+/// One draw: the number of occurrences of each cluster.
 #[derive(Debug, Clone, Copy)]
 pub struct Draw<'d> {
     units: &'d [u16],
@@ -36,7 +36,7 @@ pub struct Draw<'d> {
 }
 
 impl Draw<'_> {
-    /// How many times a cluster occurs.
+    /// Number of occurrences of a cluster.
     pub fn times(self, cluster: u32) -> usize {
         usize::from(self.times[usize::from(self.units[cluster as usize])])
     }
@@ -47,7 +47,7 @@ impl Resamples {
     #[must_use]
     pub fn new(clusters: usize) -> Self {
         let mut random = SplitMix(SEED);
-        let together = clusters.div_ceil(MOST_UNITS).max(1);
+        let together = clusters.div_ceil(MAX_UNITS).max(1);
         let count = clusters.div_ceil(together);
         let mut order: Vec<usize> = (0..clusters).collect();
         if together > 1 {
@@ -87,7 +87,7 @@ impl Resamples {
         })
     }
 
-    /// Sum over the clusters of each draw; `by_cluster` holds one number for each cluster.
+    /// The sum over the clusters of each draw; `by_cluster` has one number for each cluster.
     ///
     /// # Panics
     /// If the length of `by_cluster` is not the number of clusters.
@@ -132,25 +132,27 @@ impl Resamples {
             0.5 * libm::erfc(z / std::f64::consts::SQRT_2)
         };
         let last = values.len() - 1;
-        let at = |share: f64| values[(share * last as f64).round() as usize];
-        [at(tail), at(1.0 - tail)]
+        [tail, 1.0 - tail].map(|share| values[(share * last as f64).round() as usize])
     }
 }
 
-/// The sum of each number as often as it occurs. Whole numbers are added without error as long as the sum stays below 2²⁴, whatever
-/// their order; so eight sums side by side, which a processor adds at once, change nothing.
+/// The sum of the products of occurrences and numbers. Eight partial sums let the compiler use vector instructions. For integers the order
+/// does not matter, because sums below 2²⁴ are exact in `f32`.
 fn sum_of_products(times: &[u8], numbers: &[f32]) -> f64 {
     let mut lanes = [0.0_f32; 8];
-    let product = |n: u8, x: f32| f32::from(n) * x;
     let (whole, rest) = times.as_chunks::<8>();
     let (whole_numbers, rest_numbers) = numbers.as_chunks::<8>();
     for (times, numbers) in whole.iter().zip(whole_numbers) {
         for lane in 0..8 {
-            lanes[lane] += product(times[lane], numbers[lane]);
+            lanes[lane] += f32::from(times[lane]) * numbers[lane];
         }
     }
-    let rest = rest.iter().zip(rest_numbers).map(|(n, x)| product(*n, *x));
-    f64::from(lanes.iter().sum::<f32>() + rest.sum::<f32>())
+    let rest: f32 = rest
+        .iter()
+        .zip(rest_numbers)
+        .map(|(times, number)| f32::from(*times) * number)
+        .sum();
+    f64::from(lanes.iter().sum::<f32>() + rest)
 }
 
 #[cfg(test)]
@@ -167,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn the_interval_of_a_mean_is_students() {
+    fn interval_of_a_mean_matches_student() {
         // The standard error of the mean of 30 numbers is known.
         let numbers: Vec<f32> = (0..30_u8).map(f32::from).collect();
         let draws = Resamples::new(30);
@@ -181,13 +183,13 @@ mod tests {
     }
 
     #[test]
-    fn groups_of_clusters_give_the_interval_of_the_clusters() {
-        // Numbers that rise with the place of a cluster: groups of neighbours would be less alike than random ones.
+    fn grouped_clusters_keep_the_interval() {
+        // Numbers that increase with the index: groups of neighbours would differ more than random groups.
         for clusters in [8_193_u16, 20_000, 60_000] {
             let numbers: Vec<f32> = (0..clusters).map(f32::from).collect();
             let n = f64::from(clusters);
             let draws = Resamples::new(usize::from(clusters));
-            assert!(draws.count <= MOST_UNITS && draws.count > MOST_UNITS / 2);
+            assert!(draws.count <= MAX_UNITS && draws.count > MAX_UNITS / 2);
             let ones = draws.sums(&vec![1.0; usize::from(clusters)]);
             let means = draws
                 .sums(&numbers)
@@ -197,7 +199,7 @@ mod tests {
             let [low, high] = draws.interval(means.collect());
             let half = 1.959_964 * (n * n / 12.0 / n).sqrt();
             let ratio = (high - low) / (2.0 * half);
-            // The ends of 2000 draws are known to 5 %.
+            // The ends of an interval from 2000 draws have a relative error of 5 %.
             assert!((ratio - 1.0).abs() < 0.06, "{clusters}: {ratio}");
         }
     }

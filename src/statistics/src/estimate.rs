@@ -1,11 +1,11 @@
-//! A number with its uncertainty: [`Estimate`].
+//! A share with its 95 % interval: [`Estimate`].
 
 use serde::{Deserialize, Serialize};
 
 use super::quantiles::{degrees_of_freedom, least_share, student};
 use super::residuals::{residuals, unknown_design_effect};
 
-/// Numbers of replies and of right replies in a cluster.
+/// Counts of the replies in a cluster.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct ClusterCount {
     /// Number of right replies.
@@ -30,12 +30,11 @@ pub struct Estimate {
     pub n: usize,
 }
 
-/// The item whose estimate is furthest from 0 in either direction; of several, the first. `None` of none.
+/// The item whose estimate is furthest from 0 in either direction, and the first of equal ones; `None` without items.
 #[must_use]
 pub fn largest<'i, T>(items: &[&'i T], estimate: impl Fn(&T) -> Estimate) -> Option<&'i T> {
-    let size = |item: &T| estimate(item).value.abs();
     items.iter().copied().reduce(|largest, next| {
-        if size(next) > size(largest) {
+        if estimate(next).value.abs() > estimate(largest).value.abs() {
             next
         } else {
             largest
@@ -44,7 +43,7 @@ pub fn largest<'i, T>(items: &[&'i T], estimate: impl Fn(&T) -> Estimate) -> Opt
 }
 
 impl Estimate {
-    /// Share of `right` among `n` independent trials, with Wilson's score interval (Wilson 1927, J. Am. Stat. Assoc.
+    /// The share of `right` among `n` independent trials, with Wilson's score interval (Wilson 1927, J. Am. Stat. Assoc.
     /// 22:209). `None` without trials.
     #[must_use]
     pub fn share(right: usize, n: usize) -> Option<Self> {
@@ -55,15 +54,15 @@ impl Estimate {
         Some(Self::wilson(value, n as f64, Z, n))
     }
 
-    /// Share of right replies in clusters; `None` without replies.
+    /// The share of right replies in clusters; `None` without replies.
     ///
     /// The interval is Wilson's at the effective number of replies n / d. The design effect d ≥ 1 is the variance of the share between
     /// clusters, which is the sum of their squared [`residuals`], over that of independent replies. Student's quantile replaces the
     /// normal one. Dean and Pagano 2015 (J. Surv. Stat. Methodol. 3:484) find this interval the best of seven for clustered shares. With
     /// one reply per cluster it is Wilson's own. If all replies are right, or none, d is [`unknown_design_effect`].
     ///
-    /// The degrees of freedom are those that the clusters' residuals allow ([`degrees_of_freedom`]), and no end is further away than
-    /// the share of wholly right and of wholly wrong clusters allows ([`Self::kept_by_whole_clusters`]).
+    /// The degrees of freedom follow from the clusters' residuals ([`degrees_of_freedom`]). The shares of wholly right and wholly wrong
+    /// clusters bound the interval ([`Self::bounded_by_whole_clusters`]).
     #[must_use]
     pub fn clustered(counts: &[ClusterCount]) -> Option<Self> {
         let answered = counts.iter().filter(|count| count.replies > 0);
@@ -71,16 +70,18 @@ impl Estimate {
         if answered.clone().all(|count| count.replies == 1) || answered.clone().count() == 1 {
             return Self::share(answered.map(|count| count.right as usize).sum(), n);
         }
-        let sums = answered.map(|count| (f64::from(count.right), f64::from(count.replies)));
-        Self::scored(&sums.collect::<Vec<_>>(), 1.0, n)
+        let sums: Vec<(f64, f64)> = answered
+            .map(|count| (f64::from(count.right), f64::from(count.replies)))
+            .collect();
+        Self::from_scores(&sums, 1.0, n)
     }
 
-    /// The same for scores between 0 and 1 instead of right and wrong.
+    /// The mean of scores between 0 and 1 in clusters, with the interval of [`Self::clustered`].
     ///
-    /// `sums` holds, for each cluster, the sum of its scores and their number. A score may count for up to `max_weight`
-    /// independent replies, as the mean of several replies does. `n` is stored as the estimate's number of trials.
+    /// `sums` has, for each cluster, the sum and the number of its scores. A score may count as up to `max_weight` independent replies, if
+    /// it is the mean of several replies. `n` becomes the estimate's number of trials.
     #[must_use]
-    pub fn scored(sums: &[(f64, f64)], max_weight: f64, n: usize) -> Option<Self> {
+    pub fn from_scores(sums: &[(f64, f64)], max_weight: f64, n: usize) -> Option<Self> {
         let all: f64 = sums.iter().map(|(_, n)| n).sum();
         if all <= 0.0 {
             return None;
@@ -96,7 +97,7 @@ impl Estimate {
             unknown_design_effect(sums)
         };
         let effective = all / design_effect.max(1.0 / max_weight);
-        // At the minimum design effect no variance was estimated, so Student's quantile is not needed.
+        // At the minimum design effect the variance is not an estimate, so the normal quantile is used.
         let min_effect = if has_spread { 1.0 / max_weight } else { 1.0 };
         let quantile = if residuals.len() > 1 && design_effect > min_effect {
             student(degrees_of_freedom(&residuals))
@@ -105,29 +106,30 @@ impl Estimate {
         };
         let estimate = Self::wilson(value, effective, quantile, n);
         Some(if has_spread {
-            estimate.kept_by_whole_clusters(sums)
+            estimate.bounded_by_whole_clusters(sums)
         } else {
             estimate
         })
     }
 
-    /// The interval, cut by the exact intervals of the shares of clusters that are wholly right and wholly wrong: the share right is
-    /// at least that of wholly right clusters, and at most one minus that of wholly wrong ones.
+    /// Narrows the interval by two bounds: the share of right replies is at least the share of wholly right clusters, and at most one minus
+    /// the share of wholly wrong clusters. The bounds use the lower ends of the exact intervals of these shares.
     ///
-    /// The bound is invalid for clusters that differ much in size, so it is not applied if the largest has three times the mean or more.
-    fn kept_by_whole_clusters(self, sums: &[(f64, f64)]) -> Self {
+    /// The bounds are invalid if clusters differ much in size, so they are not applied if the largest cluster has three times the mean size
+    /// or more.
+    fn bounded_by_whole_clusters(self, sums: &[(f64, f64)]) -> Self {
         const ROUNDING: f64 = 1e-9;
         let all: f64 = sums.iter().map(|(_, n)| n).sum();
         let largest = sums.iter().map(|(_, n)| *n).fold(0.0, f64::max);
         if largest >= 3.0 * all / sums.len() as f64 {
             return self;
         }
-        let share = |is_whole: fn(&(f64, f64)) -> bool| {
-            let whole = sums.iter().filter(|cluster| is_whole(cluster));
-            least_share(whole.count(), sums.len())
-        };
-        let right = share(|(sum, n)| *sum >= n * (1.0 - ROUNDING));
-        let wrong = share(|(sum, n)| *sum <= n * ROUNDING);
+        let right = sums
+            .iter()
+            .filter(|(sum, n)| *sum >= n * (1.0 - ROUNDING))
+            .count();
+        let wrong = sums.iter().filter(|(sum, n)| *sum <= n * ROUNDING).count();
+        let [right, wrong] = [right, wrong].map(|whole| least_share(whole, sums.len()));
         Self {
             low: self.low.max(right.min(self.value)),
             high: self.high.min((1.0 - wrong).max(self.value)),
@@ -150,7 +152,7 @@ impl Estimate {
         }
     }
 
-    /// A value with this interval, which is widened so that it holds the value.
+    /// A value with this interval, widened to contain the value.
     #[must_use]
     pub fn around(value: f64, [low, high]: [f64; 2], n: usize) -> Self {
         Self {
@@ -208,8 +210,8 @@ mod tests {
     }
 
     #[test]
-    fn intervals_by_cluster_are_those_of_another_program() {
-        // numpy 2 and scipy 1.17.1, written apart from this program.
+    fn clustered_intervals_match_a_reference() {
+        // Independent implementation with numpy 2 and scipy 1.17.1.
         let one_bad = [vec![(180, 180); 51], vec![(20, 180)]].concat();
         let few = [4, 4, 3, 4, 0, 2, 4, 4, 1, 4].map(|right| (right, 4));
         let unequal = [
@@ -226,12 +228,12 @@ mod tests {
             (5, 9),
             (6, 8),
         ];
-        // One cluster has a third of all.
+        // One cluster has a third of all replies.
         let small = [5, 4, 5, 3, 5, 5, 4, 2, 5, 4, 5, 5, 3, 5, 4, 5].map(|right| (right, 5));
         let third = [&[(14, 40)], &small[..]].concat();
         let even = [5, 6, 4, 5, 5, 6, 4, 5].map(|right| (right, 10));
         for (pairs, low, high) in [
-            // Not the 73.1 % that 2 degrees of freedom alone would give.
+            // Without the bound by whole clusters, the lower end would be 73.1 %.
             (&one_bad[..], 0.897_446_455_347_9, 0.999_177_030_322_5),
             (&few, 0.424_046_756_632_2, 0.924_380_341_940_7),
             (&unequal, 0.475_837_910_733_2, 0.858_599_144_512_9),
@@ -242,7 +244,7 @@ mod tests {
             assert!((share.low - low).abs() < 1e-9, "{pairs:?}: {share:?}");
             assert!((share.high - high).abs() < 1e-9, "{pairs:?}: {share:?}");
         }
-        // One cluster holds most replies, so wholly wrong clusters do not bound the share.
+        // One cluster has most replies, so whole clusters do not bound the share.
         let large = [
             (1, 1),
             (2, 2),
@@ -259,12 +261,10 @@ mod tests {
 
     #[test]
     fn correlated_replies_count_for_fewer() {
-        let share = |pairs: &[(u32, u32)]| Estimate::clustered(&counts(pairs)).unwrap();
-        let width = |estimate: Estimate| estimate.high - estimate.low;
         // 40 of 80 are right: half of every cluster, or all or none of each cluster.
         let (spread, clumped) = (
-            share(&[(2, 4); 20]),
-            share(&[[(4, 4); 10], [(0, 4); 10]].concat()),
+            clustered(&[(2, 4); 20]),
+            clustered(&[[(4, 4); 10], [(0, 4); 10]].concat()),
         );
         assert_eq!((spread.value, spread.n), (0.5, 80));
         let independent = Estimate::share(40, 80).unwrap();
@@ -277,8 +277,16 @@ mod tests {
             Estimate::share(15, 148)
         );
         // All replies are right: the interval is wider than for the same number of independent replies.
-        let (all, alone) = (share(&[(4, 4); 20]), Estimate::share(80, 80).unwrap());
+        let (all, alone) = (clustered(&[(4, 4); 20]), Estimate::share(80, 80).unwrap());
         assert!(all.low < alone.low && all.low > 0.85, "{all:?}");
         assert_eq!(Estimate::clustered(&[]), None);
+    }
+
+    fn clustered(pairs: &[(u32, u32)]) -> Estimate {
+        Estimate::clustered(&counts(pairs)).unwrap()
+    }
+
+    fn width(estimate: Estimate) -> f64 {
+        estimate.high - estimate.low
     }
 }

@@ -1,8 +1,8 @@
-//! Quantiles and tails of distributions: [`student`] with its [`degrees_of_freedom`], [`beyond`], and [`least_share`].
+//! Quantiles and tails of distributions: [`student`] with its [`degrees_of_freedom`], [`two_sided_tail`], and [`least_share`].
 
 use statrs::distribution::{Beta, ContinuousCDF as _, StudentsT};
 
-/// The 97.5 % quantile of Student's t distribution with `degrees` degrees of freedom, which need not be whole; infinite for 0.
+/// The 97.5 % quantile of Student's t distribution with `degrees` degrees of freedom, not necessarily an integer; infinite for 0.
 #[must_use]
 pub fn student(degrees: f64) -> f64 {
     quantile(0.975, degrees)
@@ -11,23 +11,21 @@ pub fn student(degrees: f64) -> f64 {
 /// The quantile of Student's t distribution at `share`; infinite for 0 degrees of freedom.
 #[must_use]
 pub fn quantile(share: f64, degrees: f64) -> f64 {
-    let distribution = StudentsT::new(0.0, 1.0, degrees);
-    distribution.map_or(f64::INFINITY, |student| student.inverse_cdf(share))
+    StudentsT::new(0.0, 1.0, degrees).map_or(f64::INFINITY, |student| student.inverse_cdf(share))
 }
 
-/// The probability that Student's t is at least `distance` away from 0, in either direction; 1 for 0 degrees of freedom.
+/// The two-sided tail probability of Student's t: that it is at least `distance` away from 0. 1 for 0 degrees of freedom.
 #[must_use]
-pub fn beyond(distance: f64, degrees: f64) -> f64 {
-    let distribution = StudentsT::new(0.0, 1.0, degrees);
-    distribution.map_or(1.0, |student| (2.0 * student.sf(distance)).min(1.0))
+pub fn two_sided_tail(distance: f64, degrees: f64) -> f64 {
+    StudentsT::new(0.0, 1.0, degrees).map_or(1.0, |student| (2.0 * student.sf(distance)).min(1.0))
 }
 
-/// Degrees of freedom of a variance between clusters, from the clusters' residuals r: C / (κ − 1), kept within 2 and C − 1, with
-/// their kurtosis κ = C Σr⁴ / (Σr²)².
+/// Degrees of freedom of a variance between C clusters, from the clusters' residuals r: C / (κ − 1), limited to 2 to C − 1, with the
+/// kurtosis κ = C Σr⁴ / (Σr²)².
 ///
-/// The variance of a variance grows with the kurtosis (Satterthwaite 1946, Biometrics Bull. 2:110, gives 2C / (κ − 1)). κ comes from the
-/// same clusters and is too small where a few of them make the variance; in simulation half of that number holds the truth where
-/// shares are near 0 or 1 and clusters are strongly correlated (`tests/program/scores/coverage/`).
+/// The variance of a variance grows with the kurtosis (Satterthwaite 1946, Biometrics Bull. 2:110, gives 2C / (κ − 1)). κ is estimated from
+/// the same clusters and is too small if a few clusters dominate the variance. In simulations, intervals with half of Satterthwaite's
+/// number cover the truth even if shares are near 0 or 1 and clusters are strongly correlated (`tests/program/scores/coverage/`).
 #[must_use]
 pub fn degrees_of_freedom(residuals: &[f64]) -> f64 {
     let c = residuals.len() as f64;
@@ -46,8 +44,7 @@ pub fn degrees_of_freedom(residuals: &[f64]) -> f64 {
 /// 26:404).
 #[must_use]
 pub fn least_share(hits: usize, n: usize) -> f64 {
-    let distribution = Beta::new(hits as f64, (n - hits) as f64 + 1.0);
-    distribution.map_or(0.0, |beta| beta.inverse_cdf(0.025))
+    Beta::new(hits as f64, (n - hits) as f64 + 1.0).map_or(0.0, |beta| beta.inverse_cdf(0.025))
 }
 
 #[cfg(test)]
@@ -79,7 +76,7 @@ mod tests {
     ];
 
     #[test]
-    fn quantiles_are_the_tabled_ones() {
+    fn quantiles_match_published_tables() {
         // NIST/SEMATECH e-Handbook of Statistical Methods, section 1.3.6.7.2, with more digits from R's qt().
         for (degrees, expected) in [
             (1, 12.706_204_736),
@@ -99,15 +96,18 @@ mod tests {
     }
 
     #[test]
-    fn tails_are_those_of_the_quantiles() {
+    fn tails_match_the_quantiles() {
         for (degrees, quantile) in STUDENTS {
-            assert!((beyond(quantile, degrees) - 0.05).abs() < 1e-9, "{degrees}");
+            assert!(
+                (two_sided_tail(quantile, degrees) - 0.05).abs() < 1e-9,
+                "{degrees}"
+            );
         }
-        assert!((beyond(1.0, 0.0) - 1.0).abs() < 1e-15);
+        assert!((two_sided_tail(1.0, 0.0) - 1.0).abs() < 1e-15);
     }
 
     #[test]
-    fn quantiles_are_those_of_scipy() {
+    fn quantiles_match_scipy() {
         // scipy 1.17.1, t.ppf(0.975, df) and beta.ppf(0.025, hits, n - hits + 1).
         for (degrees, expected) in STUDENTS {
             assert!(

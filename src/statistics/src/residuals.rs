@@ -3,8 +3,8 @@
 /// The adjusted residuals of clusters about a mean: r / √(1 − h). Here r is a cluster's sum − `mean` × its number of replies, and h its
 /// share of all replies.
 ///
-/// `clusters` lists the sum and the number of replies of each cluster. Empty clusters are left out. A cluster that has all replies gets
-/// an infinite residual.
+/// `clusters` lists the sum and the number of replies of each cluster. Empty clusters are skipped. A cluster with all replies has an
+/// infinite residual.
 ///
 /// A cluster pulls the mean towards itself in proportion to h, which makes r too small. The sum of the squared adjusted residuals
 /// estimates the variance of the total (Bell and McCaffrey 2002, Surv. Methodol. 28:169, CR2 for a mean). For C clusters of equal size,

@@ -1,11 +1,11 @@
-//! Tests of paired differences: [`mcnemar`], [`sign_flip`] and [`swap_test`], the correction [`holm`], and what comes of them:
-//! [`Significance`].
+//! Tests of paired differences ([`mcnemar`], [`sign_flip`] and [`swap_test`]), the correction for several tests ([`holm`]), and the result
+//! ([`Significance`]).
 
 use std::fmt;
 
 use super::split_mix::SplitMix;
 
-/// The level of the tests (chosen, as usual).
+/// Significance level of the tests (conventional).
 pub const ALPHA: f64 = 0.05;
 
 /// Result of a comparison at the 5 % level, after Holm's correction.
@@ -15,17 +15,17 @@ pub enum Significance {
     Better,
     /// The first side is worse.
     Worse,
-    /// No difference is shown. This does not show that the two are equal.
+    /// No difference is detected. The two sides are not therefore equal.
     NotShown,
-    /// No verdict is possible: with this few clusters and this many tests the corrected p cannot be below 0.05, however large the
-    /// difference is.
+    /// No verdict is possible: with so few clusters and so many tests the corrected p cannot be below 0.05, however large the difference.
     TooFewClusters,
     /// Fewer items are shared than a verdict needs (`MIN_PAIRS` of the comparison).
     TooFew,
 }
 
 impl Significance {
-    /// Result of a difference from its corrected p-value, and from the smallest corrected one that the clusters allow.
+    /// The result for a difference with the corrected p-value `holm`; `least_holm` is the smallest corrected p-value that the clusters
+    /// allow.
     #[must_use]
     pub fn new(difference: f64, holm: f64, least_holm: f64) -> Self {
         if least_holm >= ALPHA {
@@ -39,13 +39,13 @@ impl Significance {
         }
     }
 
-    /// Whether a difference is shown, in either direction.
+    /// True if a difference is detected, in either direction.
     #[must_use]
     pub fn is_shown(self) -> bool {
         matches!(self, Self::Better | Self::Worse)
     }
 
-    /// Whether there is a verdict at all.
+    /// True if a verdict is possible.
     #[must_use]
     pub fn is_possible(self) -> bool {
         !matches!(self, Self::TooFew | Self::TooFewClusters)
@@ -64,23 +64,23 @@ impl Significance {
     }
 }
 
-/// Result of swapping two sides in whole clusters.
+/// Result of a permutation test that swaps the two sides in whole clusters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SwapTest {
     /// Two-sided p-value.
     pub p: f64,
-    /// How it was found.
+    /// Method of computing the p-value.
     pub by: SwapMethod,
 }
 
-/// How the share of the swaps that are at least as extreme was found.
+/// Method of computing the share of swaps that are at least as extreme as the data.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SwapMethod {
     /// All swaps were counted.
     Counted,
-    /// So many random swaps were counted.
+    /// This number of random swaps were counted.
     Drawn(usize),
-    /// The total difference of the swaps was taken as normally distributed.
+    /// The total difference of the swaps was approximated by a normal distribution.
     Normal,
 }
 
@@ -94,26 +94,30 @@ impl fmt::Display for SwapMethod {
     }
 }
 
-/// Most cells of the table of exact masses (clusters × possible sums) that are filled; 0.3 s on one core (chosen).
+/// Maximum size of the table of exact probabilities (clusters × possible sums): 0.3 s on one core (chosen).
 const MAX_CELLS: u64 = 1 << 28;
-/// Number of random swaps where the table would be larger (chosen): p = 0.05 is then known to ± 0.0014.
+/// Number of random swaps if the table would be larger (chosen): p = 0.05 is then known to ± 0.0014.
 const SWAPS: usize = 100_000;
-/// Least number of clusters that must carry a difference for the normal distribution (chosen; see [`normal_swaps`]).
-const MIN_CARRYING: f64 = 1000.0;
+/// Minimum effective number of clusters for the normal approximation (chosen; see [`normal_swaps`]).
+const MIN_EFFECTIVE_CLUSTERS: f64 = 1000.0;
 /// Seed of the random swaps (chosen). It is fixed, so that the same records give the same p-value.
 const SEED: u64 = 0x7377_6170;
 
-/// [`sign_flip`] if its table has at most 2²⁸ cells. Else [`normal_swaps`] if enough clusters carry the difference for it to be exact to
-/// 10⁻⁴. Else the Monte Carlo estimate (1 + hits) / (1 + draws) from 100,000 seeded swaps (Phipson and Smyth 2010, Stat. Appl. Genet. Mol.
-/// Biol. 9:39), which is never below the exact size.
+/// The permutation test that swaps the two sides in whole clusters. Uses [`sign_flip`] if its table has at most 2²⁸ cells; otherwise
+/// [`normal_swaps`] if enough clusters contribute for an error of at most 10⁻⁴; otherwise the Monte Carlo estimate
+/// (1 + hits) / (1 + draws) from 100,000 seeded swaps (Phipson and Smyth 2010, Stat. Appl. Genet. Mol. Biol. 9:39), which keeps the size of
+/// the test.
 #[must_use]
 pub fn swap_test(differences: &[i64]) -> SwapTest {
-    let reduced = reduced(differences);
-    let sums = reduced.iter().map(|difference| difference.unsigned_abs());
-    let cells = (sums.sum::<u64>() + 1).saturating_mul(reduced.len() as u64);
+    let reduced = reduce(differences);
+    let sum: u64 = reduced
+        .iter()
+        .map(|difference| difference.unsigned_abs())
+        .sum();
+    let cells = (sum + 1).saturating_mul(reduced.len() as u64);
     let (p, by) = if cells <= MAX_CELLS {
         (sign_flip(differences), SwapMethod::Counted)
-    } else if carrying(&reduced) >= MIN_CARRYING {
+    } else if effective_clusters(&reduced) >= MIN_EFFECTIVE_CLUSTERS {
         (normal_swaps(&reduced), SwapMethod::Normal)
     } else {
         let by = SwapMethod::Drawn(SWAPS);
@@ -122,20 +126,20 @@ pub fn swap_test(differences: &[i64]) -> SwapTest {
     SwapTest { p, by }
 }
 
-/// The number of equal clusters whose total difference would be as near to normal: (Σ d²)² / Σ d⁴. The excess kurtosis of the total
-/// is −2 divided by it.
-fn carrying(differences: &[i64]) -> f64 {
-    let power = |n: i32| -> f64 { differences.iter().map(|d| (*d as f64).powi(n)).sum() };
-    let squares = power(2);
-    squares * squares / power(4)
+/// The effective number of clusters, (Σ d²)² / Σ d⁴: the number of equal differences whose total is equally close to normal. The excess
+/// kurtosis of the total is −2 divided by this number.
+fn effective_clusters(differences: &[i64]) -> f64 {
+    let [squares, fourths] =
+        [2, 4].map(|n| differences.iter().map(|d| (*d as f64).powi(n)).sum::<f64>());
+    squares * squares / fourths
 }
 
-/// [`sign_flip`] of differences without a common divisor, with the total of the swaps taken as normally distributed.
+/// Normal approximation of [`sign_flip`], for differences without a common divisor.
 ///
-/// The total is symmetric about 0, its variance is Σ d², and it changes in steps of 2, so the probability of a total is that of the
-/// normal distribution from 1 below it to 1 above it (continuity correction). The total is symmetric, so that the first term that is
-/// left out is that of the kurtosis (Edgeworth expansion, Feller 1971, volume II, section XVI.4): 10⁻⁴ at p = 0.05 with
-/// [`MIN_CARRYING`] clusters, and a tenth of p at p = 10⁻⁸.
+/// The total of the swaps is symmetric about 0, its variance is Σ d², and it changes in steps of 2. The probability of a total is therefore
+/// that of the normal distribution from 1 below it to 1 above it (continuity correction). Because of the symmetry, the first neglected term
+/// of the Edgeworth expansion is that of the kurtosis (Feller 1971, volume II, section XVI.4): 10⁻⁴ at p = 0.05 with
+/// [`MIN_EFFECTIVE_CLUSTERS`] clusters, and a tenth of p at p = 10⁻⁸.
 fn normal_swaps(differences: &[i64]) -> f64 {
     let total = differences.iter().sum::<i64>().abs() as f64;
     let squares: f64 = differences.iter().map(|d| (*d as f64).powi(2)).sum();
@@ -147,18 +151,27 @@ fn normal_swaps(differences: &[i64]) -> f64 {
 fn drawn_swaps(differences: &[i64], draws: usize) -> f64 {
     let observed = differences.iter().sum::<i64>().abs();
     let mut random = SplitMix(SEED);
-    let mut swapped_sum = || -> i64 {
-        differences
-            .chunks(64)
-            .map(|block| {
-                let bits = random.bits();
-                let signed = |(bit, d): (usize, &i64)| if bits >> bit & 1 == 0 { *d } else { -d };
-                block.iter().enumerate().map(signed).sum::<i64>()
-            })
-            .sum()
-    };
-    let hits = (0..draws).filter(|_| swapped_sum().abs() >= observed);
-    (1 + hits.count()) as f64 / (1 + draws) as f64
+    let hits = (0..draws)
+        .filter(|_| randomly_swapped_sum(differences, &mut random).abs() >= observed)
+        .count();
+    (1 + hits) as f64 / (1 + draws) as f64
+}
+
+/// The sum of the differences, each with a random sign.
+fn randomly_swapped_sum(differences: &[i64], random: &mut SplitMix) -> i64 {
+    let mut sum = 0;
+    for block in differences.chunks(64) {
+        let mut bits = random.bits();
+        for difference in block {
+            sum += if bits & 1 == 0 {
+                *difference
+            } else {
+                -difference
+            };
+            bits >>= 1;
+        }
+    }
+    sum
 }
 
 /// Smallest two-sided p-value that swaps of this number of clusters, c, can give: 2 / 2ᶜ.
@@ -167,8 +180,8 @@ pub fn least_p(clusters: usize) -> f64 {
     (2.0 * libm::exp2(-(clusters as f64))).min(1.0)
 }
 
-/// Differences without zeros, divided by their greatest common divisor. That changes no p-value.
-fn reduced(differences: &[i64]) -> Vec<i64> {
+/// Removes zeros and divides by the greatest common divisor, which changes no p-value.
+fn reduce(differences: &[i64]) -> Vec<i64> {
     let divisor = differences.iter().fold(0, |a, d| gcd(a, d.unsigned_abs()));
     differences
         .iter()
@@ -177,7 +190,7 @@ fn reduced(differences: &[i64]) -> Vec<i64> {
         .collect()
 }
 
-/// Greatest common divisor; that of 0 and a number is the number.
+/// Greatest common divisor; `gcd(0, n)` is n.
 #[must_use]
 pub fn gcd(a: u64, b: u64) -> u64 {
     if b == 0 { a } else { gcd(b, a % b) }
@@ -197,12 +210,12 @@ pub fn mcnemar(gained: usize, lost: usize) -> f64 {
 /// Exact two-sided p-value of the hypothesis that the two sides can be swapped in every cluster: the share of the 2ᶜ swaps
 /// whose total difference is at least as far from 0 as the observed one.
 ///
-/// `differences` holds, for each cluster, the pairs gained minus the pairs lost. With one pair per cluster it is McNemar's
-/// exact test. With more it keeps its size if pairs of a cluster are correlated, which McNemar's test does not (the
-/// permutation form of Durkalski et al. 2003, Stat. Med. 22:2417).
+/// `differences` has, for each cluster, the pairs gained minus the pairs lost. With one pair per cluster this is McNemar's exact test.
+/// Unlike McNemar's test, it keeps its size if the pairs of a cluster are correlated (the permutation form of Durkalski et al. 2003, Stat.
+/// Med. 22:2417).
 #[must_use]
 pub fn sign_flip(differences: &[i64]) -> f64 {
-    let reduced = reduced(differences);
+    let reduced = reduce(differences);
     let total = reduced.iter().sum::<i64>().unsigned_abs() as usize;
     let mut sizes: Vec<usize> = reduced.iter().map(|d| d.unsigned_abs() as usize).collect();
     sizes.sort_unstable();
@@ -211,7 +224,7 @@ pub fn sign_flip(differences: &[i64]) -> f64 {
     let mut rest = &sizes[..];
     while let Some(&size) = rest.first() {
         let repeats = rest.partition_point(|other| *other == size);
-        masses = convolved(&masses, &binomial(repeats), size);
+        masses = convolve(&masses, &binomial(repeats), size);
         rest = &rest[repeats..];
     }
     let max_total: usize = sizes.iter().sum();
@@ -224,8 +237,8 @@ pub fn sign_flip(differences: &[i64]) -> f64 {
         .min(1.0)
 }
 
-/// Probability masses of a sum of two numbers, the second in steps of `step`.
-fn convolved(masses: &[f64], second: &[f64], step: usize) -> Vec<f64> {
+/// Probability masses of the sum of two random numbers, of which the second has values in steps of `step`.
+fn convolve(masses: &[f64], second: &[f64], step: usize) -> Vec<f64> {
     let mut sum = vec![0.0; masses.len() + (second.len() - 1) * step];
     for (index, weight) in second.iter().enumerate().filter(|(_, w)| **w > 0.0) {
         let at = &mut sum[index * step..][..masses.len()];
@@ -242,7 +255,7 @@ fn binomial(n: usize) -> Vec<f64> {
     let log_factorial = libm::lgamma(n as f64 + 1.0);
     let log_outcomes = n as f64 * std::f64::consts::LN_2;
     if n <= 1000 {
-        // 2⁻¹⁰⁰⁰ is not rounded to 0, so that the recurrence is exact up to rounding.
+        // 2⁻¹⁰⁰⁰ does not underflow, so the recurrence is exact up to rounding.
         let mut masses = Vec::with_capacity(n + 1);
         let mut mass = libm::exp2(-(n as f64));
         for k in 0..=n {
@@ -263,8 +276,8 @@ fn binomial(n: usize) -> Vec<f64> {
         .collect()
 }
 
-/// Holm's adjusted p-values (Holm 1979, Scand. J. Stat. 6:65), in the order of `values`. If those below 0.05 are called
-/// significant, the probability of any false positive among them is at most 5 %.
+/// Holm's adjusted p-values (Holm 1979, Scand. J. Stat. 6:65), in the order of `values`. If values below 0.05 count as detected, the
+/// probability of any false positive is at most 5 %.
 #[must_use]
 pub fn holm(values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..values.len()).collect();
@@ -354,7 +367,7 @@ mod tests {
     }
 
     #[test]
-    fn random_swaps_come_near_the_counted_ones() {
+    fn random_swaps_approximate_the_exact_test() {
         for differences in [
             vec![3, -1, 2, 4, 1, 1, 5, -2, 3, 2],
             vec![2; 9],
@@ -378,24 +391,24 @@ mod tests {
     }
 
     #[test]
-    fn the_normal_distribution_comes_near_the_counted_swaps() {
-        // Differences of 1 to 5 in a number of clusters that the table just holds; `few` of them fall.
+    fn normal_swaps_approximate_the_exact_test() {
+        // Differences of 1 to 5 in as many clusters as the table allows, `few` of them negative.
         for (clusters, few) in [(1800, 860), (1800, 830), (4000, 1900), (4000, 1850)] {
             let differences: Vec<i64> = (0..clusters)
                 .map(|i| (1 + i % 5) * if i * 7919 % clusters < few { -1 } else { 1 })
                 .collect();
-            assert!(carrying(&differences) >= MIN_CARRYING);
+            assert!(effective_clusters(&differences) >= MIN_EFFECTIVE_CLUSTERS);
             let (counted, normal) = (sign_flip(&differences), normal_swaps(&differences));
             assert!((counted - normal).abs() < 1e-4, "{counted} {normal}");
         }
-        // Far from 0, beyond what swaps could be drawn for.
+        // A p-value that is too small for random swaps.
         let far: Vec<i64> = (0..4000).map(|i| if i % 11 < 5 { -1 } else { 1 }).collect();
         let (counted, normal) = (sign_flip(&far), normal_swaps(&far));
         assert!(counted < 1e-6 && (normal / counted - 1.0).abs() < 0.05);
         // 20,000 clusters are too many for the table.
         let many: Vec<i64> = (0..20_000).map(|i| 1 + i % 5).collect();
         assert_eq!(swap_test(&many).by, SwapMethod::Normal);
-        // One cluster that carries nearly all of the difference is not normal, however many others there are.
+        // If one cluster dominates, the total is not normal, whatever the number of clusters.
         let one: Vec<i64> = (0..1500)
             .map(|i| if i == 0 { 200_001 } else { 1 })
             .collect();
@@ -406,9 +419,10 @@ mod tests {
     fn no_verdict_is_possible_with_few_clusters() {
         assert!((least_p(8) - 2.0 / 256.0).abs() < 1e-15);
         assert!((least_p(0) - 1.0).abs() < 1e-15);
-        let verdict = |least_holm| Significance::new(-0.3, least_holm, least_holm);
-        assert_eq!(verdict(5.0 * least_p(8)), Significance::Worse);
-        assert_eq!(verdict(5.0 * least_p(7)), Significance::TooFewClusters);
+        for (clusters, expected) in [(8, Significance::Worse), (7, Significance::TooFewClusters)] {
+            let least = 5.0 * least_p(clusters);
+            assert_eq!(Significance::new(-0.3, least, least), expected);
+        }
         assert_eq!(Significance::new(0.3, 0.05, 0.01), Significance::NotShown);
     }
 

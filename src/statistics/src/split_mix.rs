@@ -1,4 +1,4 @@
-//! The seeded generator of all random draws of the statistics: [`SplitMix`].
+//! The seeded random generator of this crate: [`SplitMix`].
 
 use std::convert::Infallible;
 
@@ -19,7 +19,7 @@ impl SplitMix {
         z ^ (z >> 31)
     }
 
-    /// Puts values in a random order, each as likely as any other.
+    /// Shuffles values; all orders are equally likely.
     pub fn shuffle<T>(&mut self, values: &mut [T]) {
         values.shuffle(self);
     }
@@ -46,7 +46,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn draws_are_those_of_the_generator() {
+    fn draws_match_the_reference() {
         // The first numbers of the reference implementation (Vigna, splitmix64.c) with seed 1234567.
         let mut random = SplitMix(1_234_567);
         let first = [random.bits(), random.bits()];

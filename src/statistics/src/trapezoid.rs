@@ -1,17 +1,19 @@
-//! The mean height of a curve by the trapezoid rule: [`weights`].
+//! Weights of the trapezoid rule for the mean height of a curve: [`weights`].
 
 use super::significance::gcd;
 use darkqa_ground::types::AxisLevel;
 
-/// Weights of the levels in the trapezoid rule: whole numbers without a common divisor, so that sums of them are exact.
+/// Weights of the levels in the trapezoid rule, as integers without a common divisor, so that sums are exact.
 #[must_use]
 pub fn weights(levels: &[AxisLevel]) -> Vec<u64> {
-    let drop = |level: &AxisLevel| (100.0 * level.value()).round() as u64;
-    let last = levels.len().saturating_sub(1);
-    let width = |index: usize| {
-        drop(&levels[(index + 1).min(last)]) - drop(&levels[index.saturating_sub(1)])
-    };
-    let widths: Vec<u64> = (0..levels.len()).map(width).collect();
+    let drops: Vec<u64> = levels
+        .iter()
+        .map(|level| (100.0 * level.value()).round() as u64)
+        .collect();
+    let last = drops.len().saturating_sub(1);
+    let widths: Vec<u64> = (0..drops.len())
+        .map(|index| drops[(index + 1).min(last)] - drops[index.saturating_sub(1)])
+        .collect();
     let divisor = widths.iter().copied().fold(0, gcd).max(1);
     widths.into_iter().map(|width| width / divisor).collect()
 }
@@ -23,15 +25,14 @@ mod tests {
     use darkqa_ground::types::degradations::Kind;
 
     #[test]
-    fn weights_are_those_of_the_trapezoid_rule() {
-        let level = |severity| AxisLevel::new(Kind::Sensor, severity);
-        let paper = Severity::LADDER.map(level);
+    fn weights_follow_the_trapezoid_rule() {
+        let paper = Severity::LADDER.map(|severity| AxisLevel::new(Kind::Sensor, severity));
         let paper = [&[AxisLevel::L0][..], &paper].concat();
         assert_eq!(weights(&paper), [4, 8, 8, 7, 6, 3]);
         let odd = [
             AxisLevel::L0,
-            level(Severity::hundredths(330)),
-            level(Severity::L5),
+            AxisLevel::new(Kind::Sensor, Severity::from_hundredths(330)),
+            AxisLevel::new(Kind::Sensor, Severity::L5),
         ];
         assert_eq!(weights(&odd), [11, 30, 19]);
     }

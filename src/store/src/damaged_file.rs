@@ -1,4 +1,4 @@
-//! Files of a run beside its records that are damaged: what can be read is kept, and the damaged file is set aside.
+//! Repair of damaged files other than the records of a run: readable lines are kept, and the damaged file is renamed.
 
 use std::fs;
 use std::io::{self, Read as _, Seek as _, SeekFrom};
@@ -12,8 +12,8 @@ use super::pieces::Pieces;
 use darkqa_ground::error::{Error, Result};
 use darkqa_ground::files::{reading, write_synced};
 
-/// Hands over the lines of a file that can be read, in order; none if there is no such file. Returns the damage in words, `None` if every
-/// line can be read. A last line without an end is damage.
+/// Calls `take` with each readable line of a file in order; with none if the file does not exist. Returns a description of the damage, or
+/// `None` if every line is readable. A last line without a line end counts as damage.
 pub(super) fn each_readable_line<T: StoredLine>(
     path: &Path,
     mut take: impl FnMut(T),
@@ -41,13 +41,15 @@ pub(super) fn each_readable_line<T: StoredLine>(
     }
 }
 
-/// Whether the last line of a file has its end.
+/// State of the last line of a file.
 enum LastLine {
+    /// With a line end.
     Whole,
+    /// Without a line end.
     Cut,
 }
 
-/// Hands over the number and the content of each line of a file, `None` if it cannot be parsed.
+/// Calls `take` with the number and the content of each line of a file; the content is `None` if it cannot be parsed.
 fn each_parsed_line<T: StoredLine>(
     path: &Path,
     mut take: impl FnMut(usize, Option<T>),
@@ -68,48 +70,53 @@ fn each_parsed_line<T: StoredLine>(
             take(line.number, parsed);
         }
     }
-    let last_byte = || -> io::Result<Option<u8>> {
-        let mut file = reading::open(path)?;
-        if file.metadata()?.len() == 0 {
-            return Ok(None);
-        }
-        let mut last = [0];
-        file.seek(SeekFrom::End(-1))?;
-        file.read_exact(&mut last)?;
-        Ok(Some(last[0]))
-    };
-    match last_byte().map_err(|e| Error::file(path, "read", e))? {
+    match last_byte(path).map_err(|e| Error::file(path, "read", e))? {
         None | Some(b'\n') => Ok(LastLine::Whole),
         Some(_) => Ok(LastLine::Cut),
     }
 }
 
-/// Most damaged files of one name that are kept; chosen. Then the first one is replaced.
-const MOST_ASIDE: usize = 1000;
+/// The last byte of a file; `None` if it is empty.
+fn last_byte(path: &Path) -> io::Result<Option<u8>> {
+    let mut file = reading::open(path)?;
+    if file.metadata()?.len() == 0 {
+        return Ok(None);
+    }
+    let mut last = [0];
+    file.seek(SeekFrom::End(-1))?;
+    file.read_exact(&mut last)?;
+    Ok(Some(last[0]))
+}
 
-/// Gives a damaged file another name, beside it; returns that name.
+/// Maximum number of damaged files of one name that are kept; chosen. After that, the first of them is replaced.
+const MAX_ASIDE: usize = 1000;
+
+/// Renames a damaged file within its folder and returns the new path.
 ///
 /// # Errors
 /// If it cannot be renamed.
 pub fn set_file_aside(path: &Path) -> Result<PathBuf> {
-    let name = |number: usize| {
-        let mut name = path.as_os_str().to_owned();
-        name.push(match number {
-            1 => ".damaged".to_owned(),
-            _ => format!(".damaged-{number}"),
-        });
-        PathBuf::from(name)
-    };
-    let aside = (1..=MOST_ASIDE)
-        .map(name)
+    let aside = (1..=MAX_ASIDE)
+        .map(|number| path_aside(path, number))
         .find(|path| fs::symlink_metadata(path).is_err())
-        .unwrap_or_else(|| name(1));
+        .unwrap_or_else(|| path_aside(path, 1));
     fs::rename(path, &aside).map_err(|e| Error::file(path, "rename", e))?;
     Ok(aside)
 }
 
-/// Whether a file of notes about images is damaged, missing or empty. A damaged one is replaced by its readable lines, with a warning.
-pub(super) fn lacks_notes<T: Serialize + StoredLine>(path: &Path) -> bool {
+/// The path of a damaged file with this number, from 1.
+fn path_aside(path: &Path, number: usize) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(match number {
+        1 => ".damaged".to_owned(),
+        _ => format!(".damaged-{number}"),
+    });
+    PathBuf::from(name)
+}
+
+/// Replaces a damaged file of notes about images by its readable lines, with a warning. Returns true if the file is damaged, missing or
+/// empty.
+pub(super) fn repair_notes<T: Serialize + StoredLine>(path: &Path) -> bool {
     let mut count = 0_usize;
     let Some(damage) = each_readable_line(path, |_: T| count += 1) else {
         return count == 0;
@@ -140,12 +147,11 @@ mod tests {
     fn readable_lines_are_kept() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("fidelity.jsonl");
-        let read = || {
-            let mut lines = Vec::new();
-            let damage = each_readable_line(&path, |line: ImageFidelity| lines.push(line));
-            (lines.len(), damage)
-        };
-        assert_eq!(read(), (0, None), "a missing file is not damaged");
+        assert_eq!(
+            count_readable(&path),
+            (0, None),
+            "a missing file is not damaged"
+        );
         let image = "0".repeat(64);
         let good = format!(
             r#"{{"frame":"f","condition":"L3-ev","image":"{image}","psnr":20.0,"ssim":0.5}}"#
@@ -167,7 +173,7 @@ mod tests {
             ),
         ] {
             fs::write(&path, &text).unwrap();
-            let (readable, found) = read();
+            let (readable, found) = count_readable(&path);
             assert_eq!(readable, lines, "{text:?}");
             assert_eq!(found.is_some(), damage.is_some(), "{text:?}: {found:?}");
             let words = found.unwrap_or_default();
@@ -176,6 +182,13 @@ mod tests {
         let aside = set_file_aside(&path).unwrap();
         assert!(aside.exists() && !path.exists());
         fs::create_dir(&path).unwrap();
-        assert!(read().1.is_some());
+        assert!(count_readable(&path).1.is_some());
+    }
+
+    /// The number of readable lines of a file, and its damage.
+    fn count_readable(path: &Path) -> (usize, Option<String>) {
+        let mut count = 0;
+        let damage = each_readable_line(path, |_: ImageFidelity| count += 1);
+        (count, damage)
     }
 }

@@ -10,7 +10,7 @@ use rayon::slice::ParallelSliceMut;
 
 use super::damaged_file::{each_readable_line, set_file_aside};
 use super::lines::{StoredLine, each_line, each_placed_line, lines};
-use super::pieces::{LinePlace, open_if_there};
+use super::pieces::{LinePlace, open_if_exists};
 use super::stored_trial::StoredTrial;
 use jiff::Timestamp;
 use serde_json::Value;
@@ -18,7 +18,7 @@ use serde_json::Value;
 use darkqa_ground::error::{Error, Result};
 use darkqa_ground::files::folder_access::FolderAccess;
 use darkqa_ground::files::{self, is_unfinished, reading};
-use darkqa_ground::types::flags::spelled_setting;
+use darkqa_ground::types::flags::setting_spelling;
 use darkqa_ground::types::manifests::{
     ColumnDifference, Columns, JUDGES, RecordedNames, RunManifest, differences, judge_flag,
 };
@@ -32,11 +32,11 @@ pub fn now() -> String {
 
 pub(super) const MANIFEST: &str = "manifest.json";
 pub(super) const RECORDS: &str = "records.jsonl";
-/// The questions of a run, with their words and scenes.
+/// The file of a run's questions, with their texts and scenes.
 pub(super) const QUESTIONS: &str = "questions.jsonl";
-/// Small copies of images that were sent.
+/// The file of small copies of the images that were sent.
 pub(super) const THUMBNAILS: &str = "thumbnails.jsonl";
-/// The similarity of images to their clean frames.
+/// The file of similarities of images to their clean frames.
 pub(super) const FIDELITY: &str = "fidelity.jsonl";
 
 /// The subfolder of a run for Batch API files.
@@ -46,7 +46,7 @@ pub const BATCH_STATE: &str = "state.jsonl";
 /// The subfolder of a run for its plan, which is written before the run.
 pub const PLAN: &str = "plan";
 
-/// Whether a stored run may continue at another address of its endpoint.
+/// Whether a stored run may continue with another address of a model's endpoint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AddressChange {
     /// Accept the new address: the user named this run (`--resume`), which states that it is the same model.
@@ -58,7 +58,7 @@ pub enum AddressChange {
 /// The column of models.
 const MODEL: &str = "model";
 
-/// The field of a model's entry in the manifest that holds the address.
+/// The field of a model's entry in the manifest with the address.
 const ADDRESS: &str = "--base-url";
 
 /// The field of an enhancer with the digest of its file and its sidecar.
@@ -82,40 +82,43 @@ pub(super) fn write_manifest(folder: &Path, manifest: &RunManifest) -> Result<()
 /// The last record of each trial in a run folder, in the order of each trial's first record. An incomplete last line is
 /// skipped.
 pub fn read_records<D: Detail>(folder: &Path) -> Result<Vec<Record<D>>> {
-    // A failure does not replace a reply.
-    let follow = |last: &mut Record<D>, earlier: &Record<D>| {
-        if last.failed() && !earlier.failed() {
-            last.clone_from(earlier);
-        }
-    };
-    last_of_each(folder, |record: &Record<D>| record.key, |_| (), follow)
+    let mut records: Vec<Record<D>> = Vec::new();
+    each_line(&folder.join(RECORDS), |record| records.push(record))?;
+    let merged = merge_by_key(
+        records,
+        |record| record.key,
+        |last, earlier| {
+            // A failure does not replace a reply.
+            if last.failed() && !earlier.failed() {
+                last.clone_from(earlier);
+            }
+        },
+    );
+    Ok(merged)
 }
 
 /// The last state of each trial in a run folder, in the order of [`read_records`].
 pub fn read_trials(folder: &Path) -> Result<Vec<StoredTrial>> {
     let mut models = Distinct::default();
-    let share = |trial: &mut StoredTrial| models.share(&mut trial.model);
-    last_of_each(
-        folder,
-        |trial: &StoredTrial| trial.key,
-        share,
-        StoredTrial::follow,
-    )
+    let mut trials: Vec<StoredTrial> = Vec::new();
+    each_line(&folder.join(RECORDS), |mut trial: StoredTrial| {
+        models.share(&mut trial.model);
+        trials.push(trial);
+    })?;
+    Ok(merge_by_key(
+        trials,
+        |trial| trial.key,
+        StoredTrial::add_earlier,
+    ))
 }
 
-/// The last line of each key among the records, at the place of its first one, after `share` has seen it, and `follow` the earlier
-/// lines of its key, the latest first.
-fn last_of_each<T: StoredLine>(
-    folder: &Path,
+/// Keeps the last line of each key, at the place of the first line of that key. `add_earlier` merges each earlier line of the key into it,
+/// the latest first.
+fn merge_by_key<T>(
+    mut all: Vec<T>,
     key: impl Fn(&T) -> TrialKey,
-    mut share: impl FnMut(&mut T),
-    follow: impl Fn(&mut T, &T),
-) -> Result<Vec<T>> {
-    let mut all: Vec<T> = Vec::new();
-    each_line(&folder.join(RECORDS), |mut line: T| {
-        share(&mut line);
-        all.push(line);
-    })?;
+    add_earlier: impl Fn(&mut T, &T),
+) -> Vec<T> {
     // Sorted keys take a fifth of the memory of a map.
     let mut keys: Vec<(TrialKey, u32)> = all.iter().map(key).zip(0..).collect();
     keys.par_sort_unstable();
@@ -127,7 +130,7 @@ fn last_of_each<T: StoredLine>(
         let (first, last) = (places[0].1 as usize, places[places.len() - 1].1 as usize);
         for (_, place) in places[..places.len() - 1].iter().rev() {
             let (earlier, later) = all.split_at_mut(last);
-            follow(&mut later[0], &earlier[*place as usize]);
+            add_earlier(&mut later[0], &earlier[*place as usize]);
         }
         all.swap(first, last);
         for (_, place) in &places[1..] {
@@ -136,25 +139,25 @@ fn last_of_each<T: StoredLine>(
     }
     let mut is_repeated = is_repeated.into_iter();
     all.retain(|_| is_repeated.next() == Some(false));
-    Ok(all)
+    all
 }
 
-/// The questions of a run; none if an earlier version made it, which did not store them.
+/// The questions of a run; empty for runs of earlier versions, which did not store them.
 pub fn read_questions(folder: &Path) -> Result<Vec<RunQuestion>> {
     lines(&folder.join(QUESTIONS))
 }
 
-/// Hands over the questions of a run in order; none as for [`read_questions`].
+/// Calls `take` with each question of a run in order; with none for runs of earlier versions, which did not store them.
 pub fn each_question(folder: &Path, take: impl FnMut(RunQuestion)) -> Result<()> {
     each_line(&folder.join(QUESTIONS), take)
 }
 
-/// Hands over the questions of a run in order, each with the place of its line.
+/// Calls `take` with each question of a run in order and the place of its line.
 pub fn each_placed_question(folder: &Path, take: impl FnMut(RunQuestion, LinePlace)) -> Result<()> {
     each_placed_line(&folder.join(QUESTIONS), take)
 }
 
-/// The small copies of images of a run; none if the run has no such file. Damaged ones are left out with a warning.
+/// The small copies of images of a run; empty without such a file. Damaged lines are skipped with a warning.
 #[must_use]
 pub fn read_thumbnails(folder: &Path) -> Vec<Thumbnail> {
     let mut all = Vec::new();
@@ -162,8 +165,8 @@ pub fn read_thumbnails(folder: &Path) -> Vec<Thumbnail> {
     all
 }
 
-/// The similarity of the images of a run to their clean frames, equal frames and conditions kept once; none if the run has no
-/// such file. Damaged ones are left out with a warning.
+/// The similarities of the images of a run to their clean frames; empty without such a file. Equal frames and conditions share memory.
+/// Damaged lines are skipped with a warning.
 #[must_use]
 pub fn read_fidelity(folder: &Path) -> Vec<ImageFidelity> {
     let (mut frames, mut conditions) = (Distinct::default(), Distinct::default());
@@ -176,7 +179,7 @@ pub fn read_fidelity(folder: &Path) -> Vec<ImageFidelity> {
     all
 }
 
-/// Hands over the notes about images that can be read. A report lacks the others.
+/// Calls `take` with each readable note about images; warns about others, which a report then lacks.
 fn each_readable_note<T: StoredLine>(path: &Path, take: impl FnMut(T)) {
     if let Some(damage) = each_readable_line(path, take) {
         tracing::warn!("{damage}; left out: the command that made the run makes it again");
@@ -196,27 +199,27 @@ pub fn find(base: &Path, hash: &str) -> Option<PathBuf> {
                 .and_then(OsStr::to_str)
                 .is_some_and(|name| name.ends_with(&ending))
         })
-        .filter(|path| holds_run(path) || path.join(RECORDS).is_file())
+        .filter(|path| is_run(path) || path.join(RECORDS).is_file())
         .max()
 }
 
-/// Whether a folder is that of a run.
-pub fn holds_run(folder: &Path) -> bool {
+/// True if a folder contains the manifest of a run.
+pub fn is_run(folder: &Path) -> bool {
     folder.join(MANIFEST).is_file()
 }
 
-/// Whether another process writes to a run folder.
+/// True if another process writes to a run folder.
 ///
 /// # Errors
 /// If its records cannot be opened.
 pub fn is_locked(folder: &Path) -> Result<bool> {
     let path = folder.join(RECORDS);
-    let Some(records) = open_if_there(&path)? else {
+    let Some(records) = open_if_exists(&path)? else {
         return Ok(false);
     };
     match records.try_lock_shared() {
         Err(TryLockError::WouldBlock) => Ok(true),
-        // Without locks it is not known.
+        // Unknown on a file system without locks.
         Ok(()) | Err(TryLockError::Error(_)) => Ok(false),
     }
 }
@@ -257,17 +260,13 @@ pub fn read_settings(folder: &Path) -> Result<BTreeMap<String, Value>> {
 
 /// The error text for a run with another schema than expected.
 fn schema_problem(found: &str, expected: &str, version: &str) -> String {
-    let parts = |schema: &str| -> Option<(String, u32)> {
-        let (name, number) = schema.rsplit_once('/')?;
-        Some((name.to_owned(), number.parse().ok()?))
-    };
-    // All kinds of runs share one schema number, which rises with the program's version.
-    let newest = parts(expected).map_or(0, |(_, number)| number);
-    match parts(found) {
-        Some((name, number)) if KINDS.contains(&&*name) && number < newest => format!(
+    // All kinds of runs share one schema number, which is raised with the program's version.
+    let newest = schema_parts(expected).map_or(0, |(_, number)| number);
+    match schema_parts(found) {
+        Some((name, number)) if KINDS.contains(&name) && number < newest => format!(
             "this run was made by an earlier version of darkqa-eval ({version}, schema {found:?}); run it again with this one"
         ),
-        Some((name, number)) if KINDS.contains(&&*name) && number == newest => format!(
+        Some((name, number)) if KINDS.contains(&name) && number == newest => format!(
             "the run has the schema {found:?}, {expected:?} is expected here; use another folder"
         ),
         _ => format!(
@@ -276,21 +275,27 @@ fn schema_problem(found: &str, expected: &str, version: &str) -> String {
     }
 }
 
+/// The name and number of a schema such as `darkqa.run/2`.
+fn schema_parts(schema: &str) -> Option<(&str, u32)> {
+    let (name, number) = schema.rsplit_once('/')?;
+    Some((name, number.parse().ok()?))
+}
+
 /// The kinds of runs, by the names of their schemas.
 const KINDS: [&str; 2] = ["darkqa.run", "darkqa.openeqa"];
 
-/// The most bytes of a manifest. Chosen: one of thousands of frames and models has a hundredth.
-const MOST_MANIFEST: u64 = 64 << 20;
+/// Size limit of a manifest, in bytes. Chosen: a manifest of thousands of frames and models has a hundredth of it.
+const MAX_MANIFEST_BYTES: u64 = 64 << 20;
 
 fn any_manifest(folder: &Path) -> Result<Option<RunManifest>> {
     let path = folder.join(MANIFEST);
-    // The path may lead through a file.
+    // `NotADirectory` means that a parent of the path is a file.
     if let Err(e) = fs::symlink_metadata(&path)
         && matches!(e.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory)
     {
         return Ok(None);
     }
-    let text = reading::at_most(&path, MOST_MANIFEST)?;
+    let text = reading::at_most(&path, MAX_MANIFEST_BYTES)?;
     serde_json::from_slice(&text)
         .map(Some)
         .map_err(|e| Error::Run {
@@ -301,12 +306,12 @@ fn any_manifest(folder: &Path) -> Result<Option<RunManifest>> {
         })
 }
 
-/// The damage of a manifest in words, if a run has records and its manifest is missing or cannot be read.
+/// Description of the damage if a run has records, but its manifest is missing or cannot be read.
 ///
 /// # Errors
 /// If the records cannot be opened.
 pub fn manifest_damage(folder: &Path) -> Result<Option<String>> {
-    let has_records = open_if_there(&folder.join(RECORDS))?.is_some();
+    let has_records = open_if_exists(&folder.join(RECORDS))?.is_some();
     Ok(match any_manifest(folder) {
         _ if !has_records => None,
         Ok(Some(_)) => None,
@@ -327,8 +332,8 @@ pub fn restore_manifest(folder: &Path, manifest: &RunManifest) -> Result<()> {
     write_manifest(folder, manifest)
 }
 
-/// Checks that a stored run is the requested one: the same identity, the same shard, and the same meaning of every column
-/// value that both have.
+/// Checks that a stored run is the requested one: equal identity, equal shard, and the same meaning of every column value that both
+/// contain.
 ///
 /// # Errors
 /// [`Error::Run`], which names the setting that differs.
@@ -338,22 +343,24 @@ pub fn check_same_run(
     requested: &RunManifest,
     address_change: AddressChange,
 ) -> Result<()> {
-    let wrong = |problem: String| {
-        let path = folder.to_owned();
-        Err(Error::Run { path, problem })
-    };
     if let Some((field, before, after)) = differences(&stored.identity, &requested.identity).next()
     {
-        let field = spelled_setting(field);
-        return wrong(format!(
-            "this run has another {field}: it was {before}, now it is {after}; use another --out, or the same {field}"
-        ));
+        let field = setting_spelling(field);
+        return run_error(
+            folder,
+            format!(
+                "this run has another {field}: it was {before}, now it is {after}; use another --out, or the same {field}"
+            ),
+        );
     }
     if stored.shard != requested.shard {
         let [before, after] = [stored, requested].map(|run| run.shard.as_deref().unwrap_or("none"));
-        return wrong(format!(
-            "this run has another --shard: it was {before}, now it is {after}; use another --out, or the same --shard"
-        ));
+        return run_error(
+            folder,
+            format!(
+                "this run has another --shard: it was {before}, now it is {after}; use another --out, or the same --shard"
+            ),
+        );
     }
     for difference in stored.column_differences(requested) {
         let ColumnDifference {
@@ -363,7 +370,7 @@ pub fn check_same_run(
             first: before,
             second: after,
         } = difference;
-        // A model of this name with other settings; the stored one has another name in the requested run.
+        // If the requested run contains the stored model under another name, the model was renamed.
         let mut renamed = requested
             .columns
             .get(column)
@@ -379,10 +386,10 @@ pub fn check_same_run(
         }
         let is_address = field == ADDRESS;
         let flag = match column {
-            JUDGES => spelled_setting(&judge_flag(&field)),
-            _ => spelled_setting(&field),
+            JUDGES => setting_spelling(&judge_flag(&field)),
+            _ => setting_spelling(&field),
         };
-        // Nothing was asked at an address that gave no reply, such as a mistyped one.
+        // An address without a reply, such as a mistyped one, may always change.
         let is_allowed = address_change == AddressChange::Allowed;
         if is_address && (is_allowed || !has_reply(folder, stored, value)?) {
             tracing::warn!(
@@ -391,25 +398,36 @@ pub fn check_same_run(
             continue;
         }
         if field == ENHANCER_FILE {
-            return wrong(format!(
-                "the {column} {value} ({flag}) is another one in this run: its file, its sidecar or its preset was changed since ({before} before, \
+            return run_error(
+                folder,
+                format!(
+                    "the {column} {value} ({flag}) is another one in this run: its file, its sidecar or its preset was changed since ({before} before, \
                  {after} now); restore it, or use another --out"
-            ));
+                ),
+            );
         }
         let hint = if is_address {
             " (the same model at another address: --resume)"
         } else {
             ""
         };
-        return wrong(format!(
-            "the {column} {value} has another {flag} in this run: it was {before}, now it is {after}; use another --out, or the same \
+        return run_error(
+            folder,
+            format!(
+                "the {column} {value} has another {flag} in this run: it was {before}, now it is {after}; use another --out, or the same \
              {flag}{hint}"
-        ));
+            ),
+        );
     }
     Ok(())
 }
 
-/// Whether a run has a reply of a model, or may have one in a batch.
+fn run_error(folder: &Path, problem: String) -> Result<()> {
+    let path = folder.to_owned();
+    Err(Error::Run { path, problem })
+}
+
+/// True if a run has a reply of a model, or may get one from a batch.
 fn has_reply(folder: &Path, stored: &RunManifest, model: &str) -> Result<bool> {
     if folder.join(BATCH).exists() {
         return Ok(true);
@@ -417,18 +435,21 @@ fn has_reply(folder: &Path, stored: &RunManifest, model: &str) -> Result<bool> {
     let names = RecordedNames::from_manifest(stored);
     let mut has_reply = false;
     each_line(&folder.join(RECORDS), |trial: StoredTrial| {
-        has_reply |= !trial.failed() && names.shown(&trial.model) == model;
+        has_reply |= !trial.failed() && names.table_name(&trial.model) == model;
     })?;
     Ok(has_reply)
 }
 
-/// Creates a run in a new or empty folder: writes the manifest before any other file. A new folder is for this user alone.
+/// Creates a run in a new or empty folder: writes the manifest before any other file. A new folder is private to this user.
 pub(super) fn create_run(folder: &Path, manifest: &RunManifest) -> Result<()> {
     FolderAccess::Private.create(folder)?;
-    let mut inside = fs::read_dir(folder).map_err(|e| Error::file(folder, "read", e))?;
-    // Unfinished files of a killed process do not count, nor does the plan of the run.
-    let counts = |name: &OsStr| !is_unfinished(name) && name != PLAN;
-    if inside.any(|entry| entry.is_ok_and(|entry| counts(&entry.file_name()))) {
+    let inside = fs::read_dir(folder).map_err(|e| Error::file(folder, "read", e))?;
+    // Unfinished files of a killed process and the plan of the run do not count.
+    let has_files = inside
+        .flatten()
+        .map(|entry| entry.file_name())
+        .any(|name| !is_unfinished(&name) && name != PLAN);
+    if has_files {
         let problem = "the folder is not empty and holds no run; use another --out".to_owned();
         return Err(Error::Run {
             path: folder.to_owned(),

@@ -1,4 +1,4 @@
-//! Image notes merged from several run folders, without duplicates: [`missing_thumbnails`], [`more_fidelity`].
+//! Notes about images that other run folders have and this run lacks: [`missing_thumbnails`], [`missing_fidelity`].
 
 use std::collections::HashSet;
 use std::hash::Hash;
@@ -7,7 +7,7 @@ use std::path::Path;
 use super::folder::{read_fidelity, read_thumbnails};
 use darkqa_ground::types::{FrameId, ImageFidelity, Thumbnail};
 
-/// Thumbnails in these folders that are not `present`, of the wanted frames. Each is returned once.
+/// Thumbnails of wanted frames in these folders that are not `present`, without duplicates.
 pub fn missing_thumbnails(
     present: &[Thumbnail],
     folders: &[&Path],
@@ -22,8 +22,8 @@ pub fn missing_thumbnails(
     )
 }
 
-/// Image similarities in these folders that are not `present`, of the wanted frames. Each is returned once.
-pub fn more_fidelity(
+/// Image similarities of wanted frames in these folders that are not `present`, without duplicates.
+pub fn missing_fidelity(
     present: &[ImageFidelity],
     folders: &[&Path],
     is_wanted: impl Fn(&FrameId) -> bool,

@@ -1,9 +1,9 @@
 //! The folder of a run, `results/<run>/`.
 //!
-//! `records.jsonl` is the source of truth: one line a trial, appended and handed to the operating system as soon as a reply
-//! arrives, so that a killed run loses nothing. `manifest.json` describes the run, `questions.jsonl` has its questions,
-//! `thumbnails.jsonl` small copies of its images, and `fidelity.jsonl` their similarity to the clean frames. All other files are made again from these,
-//! `records.parquet` among them: the records once more, as a table for other programs ([`ColumnFile`]).
+//! `records.jsonl` is the source of truth: one line for each trial, written to the operating system as soon as the reply arrives, so that a
+//! killed run loses nothing. `manifest.json` describes the run, `questions.jsonl` contains its questions, `thumbnails.jsonl` small copies
+//! of its images, and `fidelity.jsonl` their similarity to the clean frames. All other files are derived from these, such as
+//! `records.parquet` with the records as a table for other programs ([`ColumnFile`]).
 
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test may panic"))]
 
@@ -41,7 +41,7 @@ use darkqa_ground::types::{
 use darkqa_score::answers::record::Detail;
 
 use changed_questions::ChangedQuestions;
-use damaged_file::{each_readable_line, lacks_notes};
+use damaged_file::{each_readable_line, repair_notes};
 use folder::{FIDELITY, QUESTIONS, RECORDS, THUMBNAILS, create_run, write, write_manifest};
 use lines::{append, each_line, json_lines, lines, repair, set_aside};
 
@@ -50,7 +50,7 @@ use unlocked_log::UnlockedLog;
 
 pub use column_file::{CREATED_BY, Cell, CellKind, Column, ColumnFile, FileMetadata, Presence};
 pub use damaged_file::set_file_aside;
-pub use image_notes::{missing_thumbnails, more_fidelity};
+pub use image_notes::{missing_fidelity, missing_thumbnails};
 pub use log_mark::LogMark;
 use lost_questions::LostQuestions;
 pub use pieces::LinePlace;
@@ -59,7 +59,7 @@ pub use stored_trial::StoredTrial;
 
 pub use folder::{
     AddressChange, BATCH, BATCH_STATE, PLAN, check_same_run, each_placed_question, each_question,
-    find, holds_run, is_locked, manifest_damage, now, read_columns, read_fidelity, read_manifest,
+    find, is_locked, is_run, manifest_damage, now, read_columns, read_fidelity, read_manifest,
     read_questions, read_records, read_settings, read_thumbnails, read_trials, restore_manifest,
     schema,
 };
@@ -70,8 +70,7 @@ const TRIALS: &str = "trials.jsonl";
 /// Lines of the records that could not be read.
 const SET_ASIDE: &str = "set-aside.jsonl";
 
-/// The interval at which records are forced to the disk: the most that a power cut may lose. A killed process loses nothing.
-/// Chosen.
+/// Interval at which records are forced to the disk. A power cut loses at most the records of this time, a killed process none. Chosen.
 const SYNC_EVERY: Duration = Duration::from_secs(2);
 
 /// An open run folder, locked by this process if its file system has locks.
@@ -79,10 +78,10 @@ const SYNC_EVERY: Duration = Duration::from_secs(2);
 pub struct Store<D = ChoiceDetail> {
     folder: PathBuf,
     records: File,
-    /// The log on a file system without locks; `None` if it is locked.
+    /// Detection of other writers on a file system without locks; `None` if the file is locked.
     unlocked: Option<UnlockedLog>,
     synced: Instant,
-    /// The names of models in the records.
+    /// The names of models in records and tables.
     names: RecordedNames,
     kind: PhantomData<D>,
 }
@@ -90,24 +89,23 @@ pub struct Store<D = ChoiceDetail> {
 impl<D: Detail> Store<D> {
     /// Opens a run folder, which is created if it does not exist.
     ///
-    /// An incomplete last line is removed, so that the next record begins on a new line. Other lines that are no records are
-    /// moved to [`SET_ASIDE`], and their trials are asked again.
+    /// An incomplete last line is removed, so that the next record begins on a new line. Other lines that are not records are moved to
+    /// [`SET_ASIDE`], and their trials are asked again.
     ///
     /// # Errors
-    /// If the folder holds other files or another run (the message names the flag that differs), or if another process has
-    /// locked it.
+    /// If the folder contains other files or another run (the message names the flag that differs), or if another process has locked it.
     pub fn open(
         folder: &Path,
         manifest: &RunManifest,
         address_change: AddressChange,
     ) -> Result<Self> {
-        let store = Self::open_read(folder, manifest, address_change)?;
+        let store = Self::open_checked(folder, manifest, address_change)?;
         set_aside::<Record<D>>(&folder.join(RECORDS), &folder.join(SET_ASIDE))?;
         Ok(store)
     }
 
-    /// Opens a run folder as [`open`](Self::open). Its records were read without an error, so that none is looked at again.
-    pub fn open_read(
+    /// Opens a run folder as [`open`](Self::open) does, without checking its records, which the caller has read without an error.
+    pub fn open_checked(
         folder: &Path,
         manifest: &RunManifest,
         address_change: AddressChange,
@@ -146,23 +144,22 @@ impl<D: Detail> Store<D> {
         })
     }
 
-    /// The error that stops this process, if another one, which started earlier, writes to the run.
+    /// The error that stops this process, if a process that started earlier writes to the run.
     pub fn other_writer(&self) -> Option<Error> {
         self.unlocked.as_ref()?.problem(&self.folder)
     }
 
-    /// Replaces damaged notes about images by those that can be read. Returns whether notes were lost, or the run has records and no
-    /// such notes.
+    /// Replaces damaged notes about images by the readable ones. Returns true if the run has records and lacks notes.
     pub fn repair_notes(&self) -> bool {
-        let lacks_thumbnails = lacks_notes::<Thumbnail>(&self.folder.join(THUMBNAILS));
-        let lacks_fidelity = lacks_notes::<ImageFidelity>(&self.folder.join(FIDELITY));
+        let lacks_thumbnails = repair_notes::<Thumbnail>(&self.folder.join(THUMBNAILS));
+        let lacks_fidelity = repair_notes::<ImageFidelity>(&self.folder.join(FIDELITY));
         let has_records = self.records.metadata().is_ok_and(|log| log.len() > 0);
         has_records && (lacks_thumbnails || lacks_fidelity)
     }
 
     /// The last record of each trial, in the order of each trial's first record.
     pub fn records(&self) -> Result<Vec<Record<D>>> {
-        read_records(&self.folder).map(|records| self.shown(records))
+        read_records(&self.folder).map(|records| self.with_table_names(records))
     }
 
     /// The last state of each trial, in the order of [`records`](Self::records).
@@ -170,7 +167,7 @@ impl<D: Detail> Store<D> {
         let mut trials = read_trials(&self.folder)?;
         let mut models = Distinct::default();
         for trial in &mut trials {
-            let name = self.names.shown(&trial.model);
+            let name = self.names.table_name(&trial.model);
             if *name != **trial.model {
                 trial.model = name.to_owned().into();
                 models.share(&mut trial.model);
@@ -179,10 +176,10 @@ impl<D: Detail> Store<D> {
         Ok(trials)
     }
 
-    /// The records with the names that their models have now.
-    fn shown(&self, mut records: Vec<Record<D>>) -> Vec<Record<D>> {
+    /// The records with the names of models in tables.
+    fn with_table_names(&self, mut records: Vec<Record<D>>) -> Vec<Record<D>> {
         for record in &mut records {
-            let name = self.names.shown(&record.model);
+            let name = self.names.table_name(&record.model);
             if name != record.model {
                 record.model = name.to_owned();
             }
@@ -190,9 +187,9 @@ impl<D: Detail> Store<D> {
         records
     }
 
-    /// A record with the name that its model has in the file.
-    fn recorded<'r>(&self, record: &'r Record<D>) -> Cow<'r, Record<D>> {
-        let name = self.names.recorded(&record.model);
+    /// A record with the name of its model in the file.
+    fn with_record_name<'r>(&self, record: &'r Record<D>) -> Cow<'r, Record<D>> {
+        let name = self.names.record_name(&record.model);
         if name == record.model {
             return Cow::Borrowed(record);
         }
@@ -203,12 +200,12 @@ impl<D: Detail> Store<D> {
         })
     }
 
-    /// Appends trials that are sent in a batch to the list of such trials.
+    /// Appends trials to the list of trials that were sent in batches.
     pub fn append_to_batch(&mut self, records: &[Record<D>]) -> Result<()> {
         let path = self.batch_trials_file();
         let records: Vec<Record<D>> = records
             .iter()
-            .map(|record| self.recorded(record).into_owned())
+            .map(|record| self.with_record_name(record).into_owned())
             .collect();
         append(&path, &records)?
             .sync_all()
@@ -224,11 +221,11 @@ impl<D: Detail> Store<D> {
         .map(drop)
     }
 
-    /// Adds the small copies of images of other run folders that this run lacks, of the frames that are wanted.
+    /// Adds small copies of images from other run folders, for wanted frames, if this run lacks them.
     ///
     /// # Errors
     /// If a file cannot be read or written.
-    pub fn add_thumbnails_of(
+    pub fn add_thumbnails_from(
         &mut self,
         folders: &[&Path],
         is_wanted: impl Fn(&FrameId) -> bool,
@@ -240,17 +237,17 @@ impl<D: Detail> Store<D> {
         Ok(())
     }
 
-    /// Adds the similarities of images of other run folders that this run lacks, of the frames that are wanted.
+    /// Adds image similarities from other run folders, for wanted frames, if this run lacks them.
     ///
     /// # Errors
     /// If a file cannot be read or written.
-    pub fn add_fidelity_of(
+    pub fn add_fidelity_from(
         &mut self,
         folders: &[&Path],
         is_wanted: impl Fn(&FrameId) -> bool,
     ) -> Result<()> {
         let present = read_fidelity(&self.folder);
-        for image in more_fidelity(&present, folders, is_wanted) {
+        for image in missing_fidelity(&present, folders, is_wanted) {
             self.append_fidelity(&image)?;
         }
         Ok(())
@@ -261,13 +258,13 @@ impl<D: Detail> Store<D> {
         append(&self.folder.join(FIDELITY), std::slice::from_ref(fidelity)).map(drop)
     }
 
-    /// Writes the questions of the run, new and stored ones, in the order of the data. `inputs` is how their images were read. Questions
-    /// of records that are no longer stored are made again, if `planned`, the keys of the trials of this command, has one of their
-    /// records.
+    /// Writes the questions of the run, new and stored ones, in the order of the data. `inputs` summarizes how their image files were
+    /// decoded. A question that is missing although the run has records about it is restored from the data, if one of these records is
+    /// among the `planned` trials of this command.
     ///
     /// # Errors
-    /// If a stored question differs in a part that decides its replies or its score, or a lost one cannot be made again. The error names
-    /// the part.
+    /// If a stored question differs in a part that decides its replies or its score (the error names the part), or if a missing question
+    /// cannot be restored.
     pub fn add_questions(
         &self,
         mut questions: Vec<RunQuestion>,
@@ -277,13 +274,11 @@ impl<D: Detail> Store<D> {
         let path = self.folder.join(QUESTIONS);
         let mut stored_questions: Vec<RunQuestion> = Vec::new();
         let damage = each_readable_line(&path, |question| stored_questions.push(question));
-        let stored_ids = stored_questions.iter().map(|question| question.id.clone());
-        let lost = LostQuestions::find(
-            &self.folder,
-            &questions,
-            &stored_ids.collect(),
-            damage.as_deref(),
-        )?;
+        let stored_ids = stored_questions
+            .iter()
+            .map(|question| question.id.clone())
+            .collect();
+        let lost = LostQuestions::find(&self.folder, &questions, &stored_ids, damage.as_deref())?;
         lost.check(&path, planned)?;
         let mut changed = ChangedQuestions::default();
         let places: HashMap<QuestionId, usize> = questions
@@ -297,7 +292,7 @@ impl<D: Detail> Store<D> {
                 continue;
             };
             let question = &mut questions[place];
-            // A scene decides no reply: it can be named later, and stays.
+            // A scene does not affect replies: it may be added later, and is kept.
             if question.scene.is_empty() {
                 question.scene.clone_from(&stored.scene);
             }
@@ -306,12 +301,12 @@ impl<D: Detail> Store<D> {
                 changed.add(part, &stored, question);
                 continue;
             }
-            // A run of blind models alone does not read the image.
+            // A run with only blind models does not read the image.
             question.image = question.image.or(stored.image);
-            // A group decides no reply: it can be named later, and stays.
+            // A group does not affect replies: it may be added later, and is kept.
             question.group = question.group.take().or(stored.group);
         }
-        if let Some(problem) = changed.problem(|| self.reads_alike(inputs)) {
+        if let Some(problem) = changed.problem(|| self.is_decoded_alike(inputs)) {
             let path = self.folder.clone();
             return Err(Error::Run { path, problem });
         }
@@ -332,10 +327,12 @@ impl<D: Detail> Store<D> {
         self.write_questions(&questions)
     }
 
-    /// Whether the images of the run were read in the same way when it was last written.
-    fn reads_alike(&self, inputs: Option<&InputSummary>) -> bool {
-        let stored = read_manifest(&self.folder, D::SCHEMA).ok().flatten();
-        stored.is_some_and(|stored| stored.inputs.as_ref() == inputs)
+    /// True if the image files of the stored run were decoded in the same way.
+    fn is_decoded_alike(&self, inputs: Option<&InputSummary>) -> bool {
+        read_manifest(&self.folder, D::SCHEMA)
+            .ok()
+            .flatten()
+            .is_some_and(|stored| stored.inputs.as_ref() == inputs)
     }
 
     /// Replaces the stored questions of the run.
@@ -346,7 +343,7 @@ impl<D: Detail> Store<D> {
         )
     }
 
-    /// Replaces the stored questions of the run by lines that `write` hands over, as they are in the file of another run.
+    /// Replaces the stored questions of the run by lines from the file of another run; `write` passes each line to its argument.
     pub fn write_question_lines(
         &self,
         write: impl FnOnce(&mut dyn FnMut(&[u8]) -> Result<()>) -> Result<()>,
@@ -360,12 +357,12 @@ impl<D: Detail> Store<D> {
         })
     }
 
-    /// The trials that were sent in batches, without replies; a trial that was sent again is in the list again.
+    /// The trials that were sent in batches, without replies. A trial that was sent again occurs several times.
     pub fn batch_trials(&self) -> Result<Vec<Record<D>>> {
-        lines(&self.batch_trials_file()).map(|records| self.shown(records))
+        lines(&self.batch_trials_file()).map(|records| self.with_table_names(records))
     }
 
-    /// The keys of these trials.
+    /// The keys of the trials that were sent in batches.
     pub fn batch_keys(&self) -> Result<BTreeSet<TrialKey>> {
         let mut keys = BTreeSet::new();
         each_line(&self.batch_trials_file(), |trial: StoredTrial| {
@@ -374,12 +371,12 @@ impl<D: Detail> Store<D> {
         Ok(keys)
     }
 
-    /// The file of these trials.
+    /// The file of the trials that were sent in batches.
     pub fn batch_trials_file(&self) -> PathBuf {
         self.folder.join(BATCH).join(TRIALS)
     }
 
-    /// The trials whose batch has no result yet: they have no reply, and were sent more often than they failed.
+    /// The trials without a result of their batch: trials without a reply that were sent more often than they failed.
     pub fn pending_in_batches(&self) -> Result<BTreeSet<TrialKey>> {
         let mut pending = HashMap::<TrialKey, usize>::new();
         let mut limits = HashMap::<TrialKey, u32>::new();
@@ -414,7 +411,7 @@ impl<D: Detail> Store<D> {
         &self.folder
     }
 
-    /// Appends one record. After this returns, a killed process cannot lose it.
+    /// Appends one record, which a killed process then no longer loses.
     pub fn append(&mut self, record: &Record<D>) -> Result<()> {
         let line = self.line(record)?;
         self.append_lines(&line)
@@ -422,16 +419,16 @@ impl<D: Detail> Store<D> {
 
     /// The line of a record, with its end.
     pub fn line(&self, record: &Record<D>) -> Result<Vec<u8>> {
-        let mut line = serde_json::to_vec(&*self.recorded(record))
+        let mut line = serde_json::to_vec(&*self.with_record_name(record))
             .map_err(|e| Error::file(self.folder.join(RECORDS), "write", e.into()))?;
         line.push(b'\n');
         Ok(line)
     }
 
-    /// Appends the lines of records, with their ends, as they are in the file of another run with the same names of models.
+    /// Appends lines of records, with their ends, from the file of another run with the same names of models.
     pub fn append_lines(&mut self, lines: &[u8]) -> Result<()> {
         if let Some(unlocked) = &mut self.unlocked {
-            unlocked.appends(&self.records, lines.len());
+            unlocked.before_append(&self.records, lines.len());
         }
         self.records
             .write_all(lines)

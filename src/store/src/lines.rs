@@ -1,14 +1,14 @@
-//! Files of one JSON object a line. A killed process may leave the last line incomplete.
+//! Files with one JSON object per line. A killed process may leave the last line incomplete.
 
 use std::fs::{File, OpenOptions};
-use std::io::{ErrorKind, Read, Seek, SeekFrom, Write};
+use std::io::{self, ErrorKind, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
 use rayon::prelude::*;
 use serde::Serialize;
 use serde::de::Error as _;
 
-use super::pieces::{FileLine, LinePlace, Pieces};
+use super::pieces::{LinePlace, Pieces};
 use super::reread_record::RereadRecord;
 use super::stored_trial::StoredTrial;
 use super::trial_line::TrialLine;
@@ -21,12 +21,12 @@ use darkqa_score::answers::record::{Detail, reread};
 /// Appends lines to a file, which is created if it does not exist.
 pub(super) fn append<T: Serialize + StoredLine>(path: &Path, values: &[T]) -> Result<File> {
     let lines = json_lines(path, values)?;
-    let file = OpenOptions::new()
+    let mut file = OpenOptions::new()
         .read(true)
         .append(true)
         .create(true)
-        .open(path);
-    let mut file = file.map_err(|e| Error::file(path, "write", e))?;
+        .open(path)
+        .map_err(|e| Error::file(path, "write", e))?;
     repair::<T>(path, &file)?;
     file.write_all(&lines)
         .map_err(|e| Error::file(path, "write", e))?;
@@ -43,20 +43,20 @@ pub(super) fn json_lines<T: Serialize>(path: &Path, values: &[T]) -> Result<Vec<
     Ok(lines)
 }
 
-/// The complete lines of a file of a run; none if there is no such file.
+/// The complete lines of a file; empty if the file does not exist.
 pub(super) fn lines<T: StoredLine>(path: &Path) -> Result<Vec<T>> {
     let mut values = Vec::new();
     each_line(path, |value| values.push(value))?;
     Ok(values)
 }
 
-/// Hands over the complete lines of a file of a run in order, none if there is no such file. They are parsed on all cores, and the
-/// file is not held in memory.
+/// Calls `take` with each complete line of a file in order; with none if the file does not exist. Lines are parsed on all cores, and the
+/// whole file is never in memory.
 pub(super) fn each_line<T: StoredLine>(path: &Path, mut take: impl FnMut(T)) -> Result<()> {
     each_placed_line(path, |value, _| take(value))
 }
 
-/// Hands over the complete lines of a file as [`each_line`], each with its place.
+/// Calls `take` with each complete line as [`each_line`] does, and with its place.
 pub(super) fn each_placed_line<T: StoredLine>(
     path: &Path,
     mut take: impl FnMut(T, LinePlace),
@@ -85,11 +85,11 @@ pub(super) fn each_placed_line<T: StoredLine>(
     Ok(())
 }
 
-/// Moves the lines that are no `T` into the file `aside`, and leaves blanks in their place. So one damaged line costs its own trial
-/// alone, and nothing of it is lost.
+/// Moves the lines that are not a `T` to the file `aside`, and replaces them by spaces. A damaged line thus affects only its own trial, and
+/// its content is kept.
 ///
 /// # Errors
-/// If no line at all is a `T`: then it is another file.
+/// If no line is a `T`, so that this is probably another file.
 pub(super) fn set_aside<T: StoredLine>(path: &Path, aside: &Path) -> Result<()> {
     let Some(mut pieces) = Pieces::open(path)? else {
         return Ok(());
@@ -98,8 +98,10 @@ pub(super) fn set_aside<T: StoredLine>(path: &Path, aside: &Path) -> Result<()> 
     let mut bad: Vec<BadLine> = Vec::new();
     while let Some(piece) = pieces.next()? {
         let lines = piece.lines();
-        let problem = |line: &FileLine<'_>| T::parse(line.bytes).err();
-        let problems: Vec<Option<serde_json::Error>> = lines.par_iter().map(problem).collect();
+        let problems: Vec<Option<serde_json::Error>> = lines
+            .par_iter()
+            .map(|line| T::parse(line.bytes).err())
+            .collect();
         for (line, problem) in lines.iter().zip(problems) {
             match problem {
                 None => good += 1,
@@ -149,24 +151,24 @@ pub(super) fn set_aside<T: StoredLine>(path: &Path, aside: &Path) -> Result<()> 
         T::WHAT,
         first.problem,
         aside.display(),
-        paid(&bad)
+        cost_in_words(&bad)
     );
     Ok(())
 }
 
-/// A line that cannot be read.
+/// A line that cannot be parsed.
 struct BadLine {
-    /// Its number, from 1.
+    /// The line number, from 1.
     number: usize,
-    /// The place of its first byte in the file.
+    /// The byte offset of the line in the file.
     start: u64,
     /// The line with its end.
     line: Vec<u8>,
     problem: String,
 }
 
-/// Tokens charged for the replies of damaged lines, as far as they can be read.
-fn paid(bad: &[BadLine]) -> String {
+/// The tokens charged for the replies of damaged lines in words, if they can be read.
+fn cost_in_words(bad: &[BadLine]) -> String {
     let known: Vec<u64> = bad
         .iter()
         .filter_map(|bad| {
@@ -186,12 +188,12 @@ fn paid(bad: &[BadLine]) -> String {
 }
 
 const A_RECORD: &str = "a record";
-const REMEDY_OF_A_RECORD: &str = "the command that made the run, called again, sets single such lines aside and asks their trials again; \
+const RECORD_REMEDY: &str = "the command that made the run, called again, sets single such lines aside and asks their trials again; \
                              or restore the file";
 
 /// The content of one line in a file of a run.
 pub(super) trait StoredLine: Sized + Send {
-    /// The name in error messages, with its article.
+    /// The name in error messages, with an article.
     const WHAT: &str;
     /// Remedy for a damaged line.
     const REMEDY: &str =
@@ -203,7 +205,7 @@ pub(super) trait StoredLine: Sized + Send {
 
 impl<D: Detail> StoredLine for Record<D> {
     const WHAT: &str = A_RECORD;
-    const REMEDY: &str = REMEDY_OF_A_RECORD;
+    const REMEDY: &str = RECORD_REMEDY;
 
     fn parse(line: &[u8]) -> serde_json::Result<Self> {
         D::parse_record(line)
@@ -212,7 +214,7 @@ impl<D: Detail> StoredLine for Record<D> {
 
 impl<D: Detail> StoredLine for RereadRecord<D> {
     const WHAT: &str = A_RECORD;
-    const REMEDY: &str = REMEDY_OF_A_RECORD;
+    const REMEDY: &str = RECORD_REMEDY;
 
     fn parse(line: &[u8]) -> serde_json::Result<Self> {
         reread(D::parse_record(line)?)
@@ -223,7 +225,7 @@ impl<D: Detail> StoredLine for RereadRecord<D> {
 
 impl StoredLine for StoredTrial {
     const WHAT: &str = A_RECORD;
-    const REMEDY: &str = REMEDY_OF_A_RECORD;
+    const REMEDY: &str = RECORD_REMEDY;
 
     fn parse(line: &[u8]) -> serde_json::Result<Self> {
         serde_json::from_slice(line)
@@ -232,7 +234,7 @@ impl StoredLine for StoredTrial {
 
 impl StoredLine for TrialLine {
     const WHAT: &str = A_RECORD;
-    const REMEDY: &str = REMEDY_OF_A_RECORD;
+    const REMEDY: &str = RECORD_REMEDY;
 
     fn parse(line: &[u8]) -> serde_json::Result<Self> {
         serde_json::from_slice(line)
@@ -263,17 +265,15 @@ impl StoredLine for ImageFidelity {
     }
 }
 
-/// Whether a file has lines of a kind: one of the whole lines in its first `complete` bytes does, or without any whole line it begins as
-/// an object.
-fn is_of<T: StoredLine>(path: &Path, complete: u64) -> Result<bool> {
-    let unreadable = |e| Error::file(path, "read", e);
+/// True if a file seems to contain lines of a type: one of the complete lines in its first `complete` bytes can be parsed, or without
+/// complete lines the file begins with `{`.
+fn has_lines_of<T: StoredLine>(path: &Path, complete: u64) -> Result<bool> {
     if complete == 0 {
         let mut first = [0];
-        return Ok(reading::open(path)
+        let read = reading::open(path)
             .and_then(|mut file| file.read(&mut first))
-            .map_err(unreadable)?
-            == 1
-            && first == *b"{");
+            .map_err(|e| Error::file(path, "read", e))?;
+        return Ok(read == 1 && first == *b"{");
     }
     let Some(mut pieces) = Pieces::open(path)? else {
         return Ok(false);
@@ -282,40 +282,29 @@ fn is_of<T: StoredLine>(path: &Path, complete: u64) -> Result<bool> {
     while let Some(piece) = pieces.next()? {
         let lines = piece.lines();
         is_blank &= lines.is_empty();
-        let mut lines = lines.iter();
-        if lines.any(|line| T::parse(line.bytes).is_ok()) {
+        if lines.iter().any(|line| T::parse(line.bytes).is_ok()) {
             return Ok(true);
         }
     }
-    // All lines were set aside.
+    // If all lines are blank, they were set aside.
     Ok(is_blank)
 }
 
 /// Cuts off an incomplete last line: everything after the last line end.
 ///
 /// # Errors
-/// If the file does not look like one of this kind: no whole line parses, or there is none and the incomplete one does not begin as one.
-/// Such a file is left unchanged.
-pub(super) fn repair<T: StoredLine>(path: &Path, mut file: &File) -> Result<()> {
-    const STEP: u64 = 64 * 1024;
-    let unreadable = |e| Error::file(path, "read", e);
-    let length = file.metadata().map_err(unreadable)?.len();
-    let (mut end, mut complete) = (length, 0);
-    while end > 0 && complete == 0 {
-        let start = end.saturating_sub(STEP);
-        let mut chunk = vec![0; (end - start) as usize];
-        file.seek(SeekFrom::Start(start)).map_err(unreadable)?;
-        file.read_exact(&mut chunk).map_err(unreadable)?;
-        complete = chunk
-            .iter()
-            .rposition(|&byte| byte == b'\n')
-            .map_or(0, |at| start + at as u64 + 1);
-        end = start;
-    }
+/// If the file seems to be of another kind: no complete line can be parsed, or without complete lines it does not begin with `{`. Such a
+/// file is not changed.
+pub(super) fn repair<T: StoredLine>(path: &Path, file: &File) -> Result<()> {
+    let length = file
+        .metadata()
+        .map_err(|e| Error::file(path, "read", e))?
+        .len();
+    let complete = complete_length(file, length).map_err(|e| Error::file(path, "read", e))?;
     if complete == length {
         return Ok(());
     }
-    if !is_of::<T>(path, complete)? {
+    if !has_lines_of::<T>(path, complete)? {
         let problem = format!("not {}, and no other line is; {}", T::WHAT, T::REMEDY);
         let lines = "its last line, which has no end";
         return Err(Error::data(format!("{}, {lines}", path.display()), problem));
@@ -326,4 +315,21 @@ pub(super) fn repair<T: StoredLine>(path: &Path, mut file: &File) -> Result<()> 
     );
     file.set_len(complete)
         .map_err(|e| Error::file(path, "write", e))
+}
+
+/// The number of bytes up to and including the last line end; 0 without a line end.
+fn complete_length(mut file: &File, length: u64) -> io::Result<u64> {
+    const STEP: u64 = 64 * 1024;
+    let mut end = length;
+    while end > 0 {
+        let start = end.saturating_sub(STEP);
+        let mut chunk = vec![0; (end - start) as usize];
+        file.seek(SeekFrom::Start(start))?;
+        file.read_exact(&mut chunk)?;
+        if let Some(at) = chunk.iter().rposition(|&byte| byte == b'\n') {
+            return Ok(start + at as u64 + 1);
+        }
+        end = start;
+    }
+    Ok(0)
 }

@@ -1,26 +1,26 @@
-//! [`LogMark`]: state of a run's records at the time when a file was derived from them.
+//! [`LogMark`]: fingerprint of a run's records, stored in files that are derived from them.
 
-use std::io::{ErrorKind, Read, Seek, SeekFrom};
-use std::path::Path;
+use std::io::{self, ErrorKind, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
 
 use super::folder::{MANIFEST, QUESTIONS, RECORDS};
 use darkqa_ground::error::{Error, Result};
 use darkqa_ground::files::reading;
 use darkqa_ground::types::Digest;
 
-/// How much of the end of the records is looked at, in bytes. Records are appended: whatever changes them changes their end.
-const TAIL: u64 = 64 << 10;
+/// Number of bytes at the end of the records that are hashed. Records are only appended, so every change changes the end.
+const TAIL_BYTES: u64 = 64 << 10;
 
-/// Digests by which a file that was made from a run folder is known to be as new as the records.
+/// A fingerprint of the files of a run folder. A derived file with the same mark is up to date.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LogMark {
     /// The digest of `manifest.json`.
     manifest: Digest,
-    /// The digest of `questions.jsonl`; of nothing if there is none.
+    /// The digest of `questions.jsonl`; the digest of no bytes without the file.
     questions: Digest,
     /// The length of `records.jsonl`, in bytes.
     log_bytes: u64,
-    /// The digest of its last 64 KB.
+    /// The digest of the last 64 KiB of `records.jsonl`.
     log_tail: Digest,
 }
 
@@ -30,26 +30,11 @@ impl LogMark {
     /// # Errors
     /// If a file cannot be read.
     pub fn read(folder: &Path) -> Result<Self> {
-        let whole = |name: &str| {
-            let path = folder.join(name);
-            match reading::read(&path) {
-                Ok(content) => Ok(Digest::from_bytes(&content)),
-                Err(e) if e.kind() == ErrorKind::NotFound => Ok(Digest::from_bytes(&[])),
-                Err(e) => Err(Error::file(path, "read", e)),
-            }
-        };
         let path = folder.join(RECORDS);
-        let unreadable = |e| Error::file(&path, "read", e);
-        let mut log = reading::open(&path).map_err(unreadable)?;
-        let log_bytes = log.metadata().map_err(unreadable)?.len();
-        let mut tail = Vec::new();
-        let start = log_bytes.saturating_sub(TAIL);
-        let read = log.seek(SeekFrom::Start(start));
-        read.and_then(|_| log.take(TAIL).read_to_end(&mut tail))
-            .map_err(unreadable)?;
+        let (log_bytes, tail) = read_tail(&path).map_err(|e| Error::file(&path, "read", e))?;
         Ok(Self {
-            manifest: whole(MANIFEST)?,
-            questions: whole(QUESTIONS)?,
+            manifest: file_digest(folder.join(MANIFEST))?,
+            questions: file_digest(folder.join(QUESTIONS))?,
             log_bytes,
             log_tail: Digest::from_bytes(&tail),
         })
@@ -66,31 +51,50 @@ impl LogMark {
     }
 }
 
+/// The length of a file, and its last bytes.
+fn read_tail(path: &Path) -> io::Result<(u64, Vec<u8>)> {
+    let mut file = reading::open(path)?;
+    let length = file.metadata()?.len();
+    file.seek(SeekFrom::Start(length.saturating_sub(TAIL_BYTES)))?;
+    let mut tail = Vec::new();
+    file.take(TAIL_BYTES).read_to_end(&mut tail)?;
+    Ok((length, tail))
+}
+
+/// The digest of a file; the digest of no bytes if it does not exist.
+fn file_digest(path: PathBuf) -> Result<Digest> {
+    match reading::read(&path) {
+        Ok(content) => Ok(Digest::from_bytes(&content)),
+        Err(e) if e.kind() == ErrorKind::NotFound => Ok(Digest::from_bytes(&[])),
+        Err(e) => Err(Error::file(path, "read", e)),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn a_mark_changes_with_each_file_that_it_is_of() {
+    fn marks_change_with_each_file() {
         let folder = tempfile::tempdir().unwrap();
-        let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text);
-        let mark = || LogMark::read(folder.path()).unwrap();
-        write(RECORDS, &"one line\n".repeat(20_000)).unwrap();
-        let mut marks = vec![mark()];
-        write(MANIFEST, "{}").unwrap();
-        marks.push(mark());
-        write(QUESTIONS, "{}").unwrap();
-        marks.push(mark());
-        write(RECORDS, &"one line\n".repeat(20_001)).unwrap();
-        marks.push(mark());
-        write(
-            RECORDS,
-            &"one line\n".repeat(20_000).replacen("one", "two", 1),
-        )
-        .unwrap();
-        assert_eq!(mark(), marks[2], "the beginning is not looked at");
-        write(RECORDS, &("one line\n".repeat(20_000) + "one lime\n")).unwrap();
-        marks.push(mark());
+        let lines = "one line\n".repeat(20_000);
+        let longer = "one line\n".repeat(20_001);
+        let other_end = lines.clone() + "one lime\n";
+        let mut marks = Vec::new();
+        for (name, text) in [
+            (RECORDS, &*lines),
+            (MANIFEST, "{}"),
+            (QUESTIONS, "{}"),
+            (RECORDS, &*longer),
+            (RECORDS, &*other_end),
+        ] {
+            std::fs::write(folder.path().join(name), text).unwrap();
+            marks.push(LogMark::read(folder.path()).unwrap());
+        }
+        let other_start = lines.replacen("one", "two", 1);
+        std::fs::write(folder.path().join(RECORDS), other_start).unwrap();
+        let mark = LogMark::read(folder.path()).unwrap();
+        assert_eq!(mark, marks[2], "the beginning is not hashed");
         for (i, one) in marks.iter().enumerate() {
             assert!(marks[i + 1..].iter().all(|other| other != one), "{i}");
         }

@@ -1,4 +1,4 @@
-//! Questions of records that a damaged run no longer stores: [`LostQuestions`].
+//! Questions that are missing in a damaged run, although it has records about them: [`LostQuestions`].
 
 use std::collections::{BTreeMap, HashSet};
 use std::path::Path;
@@ -8,16 +8,16 @@ use darkqa_ground::error::{Error, Result};
 use darkqa_ground::types::text::excerpt;
 use darkqa_ground::types::{QuestionId, RunQuestion, TrialKey};
 
-/// The most characters of a question's name in the message.
-const SHOWN: usize = 60;
+/// Maximum number of characters of a question's name in the message.
+const MAX_CHARS: usize = 60;
 
-/// The keys of the records about questions that are no longer stored, by question.
+/// The keys of the records about questions that are not stored, by question.
 #[derive(Debug, Default)]
 pub(super) struct LostQuestions(BTreeMap<QuestionId, Vec<TrialKey>>);
 
 impl LostQuestions {
-    /// Finds the records about questions that are not `stored`. The records are read only if questions of the data are not stored, or
-    /// the file is damaged.
+    /// Finds the records about questions that are not `stored`. The records are read only if a question of the data is not stored, or if
+    /// the file of questions is damaged.
     ///
     /// # Errors
     /// If the records cannot be read.
@@ -47,10 +47,11 @@ impl LostQuestions {
         self.0.len()
     }
 
-    /// Checks that each lost question is that of the data: its words and choices are in the keys of its trials.
+    /// Checks that the data contains each lost question: a key of its records is among those of the `planned` trials. A key contains the
+    /// text and choices of its question.
     ///
     /// # Errors
-    /// If no record of a question is among the `planned` trials.
+    /// If no record of a question is among the planned trials.
     pub(super) fn check(
         &self,
         path: &Path,
@@ -72,7 +73,7 @@ impl LostQuestions {
              the same data",
             others.count() + 1,
             self.len(),
-            excerpt(&first.0, SHOWN)
+            excerpt(&first.0, MAX_CHARS)
         );
         Err(Error::Run {
             path: path.to_owned(),

@@ -1,6 +1,6 @@
-//! Check that a run folder has no links, so that writing changes no file elsewhere: [`check_own`].
+//! Check that a run folder has no links: [`check_own`].
 //!
-//! A run folder may come from a stranger. A link in it would have this program write into a file or a folder outside of it.
+//! A run folder may have been downloaded. Through a link in it, this program would write to a file or folder outside of the run.
 
 use std::ffi::OsStr;
 use std::fs::{self, DirEntry, Metadata};
@@ -9,7 +9,7 @@ use std::path::Path;
 use super::folder::{BATCH, BATCH_STATE, FIDELITY, RECORDS, THUMBNAILS};
 use darkqa_ground::error::{Error, Result};
 
-/// The subfolders of a run that lines are appended in.
+/// The subfolders of a run with files that are appended to.
 const INNER: [&str; 1] = [BATCH];
 /// The files that are appended to. All others are replaced by new files, so that the target of a link stays unchanged.
 const APPENDED: [&str; 4] = [RECORDS, THUMBNAILS, FIDELITY, BATCH_STATE];
@@ -31,10 +31,9 @@ pub(super) fn check_own(folder: &Path) -> Result<()> {
 }
 
 fn check_entries(folder: &Path) -> Result<()> {
-    let unreadable = |e| Error::file(folder, "read", e);
-    for entry in fs::read_dir(folder).map_err(unreadable)? {
-        let entry = entry.map_err(unreadable)?;
-        if let Some(what) = foreign(&entry) {
+    for entry in fs::read_dir(folder).map_err(|e| Error::file(folder, "read", e))? {
+        let entry = entry.map_err(|e| Error::file(folder, "read", e))?;
+        if let Some(what) = foreign_kind(&entry) {
             return Err(Error::Run {
                 path: entry.path(),
                 problem: format!(
@@ -47,10 +46,10 @@ fn check_entries(folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Kind of an entry that would redirect writing elsewhere; `None` for a regular one.
-fn foreign(entry: &DirEntry) -> Option<&'static str> {
+/// Description of an entry through which the program would write elsewhere; `None` for a regular entry.
+fn foreign_kind(entry: &DirEntry) -> Option<&'static str> {
     let name = entry.file_name();
-    // Without following links.
+    // The metadata of the entry itself, without following a link.
     let own = entry.metadata().ok()?;
     if own.is_symlink() {
         let is_list = Path::new(&name).extension() == Some(OsStr::new("jsonl"));
@@ -60,18 +59,18 @@ fn foreign(entry: &DirEntry) -> Option<&'static str> {
         return Some("a pipe or a device");
     }
     let is_appended = APPENDED.iter().any(|appended| name == *appended);
-    (is_appended && own.is_file() && names(&own) > 1)
+    (is_appended && own.is_file() && link_count(&own) > 1)
         .then_some("a file with a second name (a hard link)")
 }
 
-/// The number of names of a file.
+/// The number of hard links of a file.
 #[cfg(unix)]
-fn names(file: &Metadata) -> u64 {
+fn link_count(file: &Metadata) -> u64 {
     std::os::unix::fs::MetadataExt::nlink(file)
 }
 
-/// The number of names of a file; not known here.
+/// 1, because the number of hard links is not available.
 #[cfg(not(unix))]
-fn names(_: &Metadata) -> u64 {
+fn link_count(_: &Metadata) -> u64 {
     1
 }

@@ -1,4 +1,4 @@
-//! A file of lines that is read piece by piece, so that it may be larger than the memory: [`Pieces`].
+//! Reader of the lines of a file in pieces, so that the file may be larger than the memory: [`Pieces`].
 
 use std::fs::File;
 use std::io::{ErrorKind, Read};
@@ -7,62 +7,64 @@ use std::path::Path;
 use darkqa_ground::error::{Error, Result};
 use darkqa_ground::files::reading;
 
-/// The bytes that are read at once. A piece is longer only if one line is. Chosen: enough lines for all cores.
+/// The size of a piece in bytes; larger only for a longer line. Chosen: enough lines for all cores.
 const PIECE_BYTES: u64 = 4 << 20;
 
-/// The most bytes of a line. Chosen: the copies of an image with all things in it take a hundredth.
-const MOST_LINE: usize = 64 << 20;
+/// Size limit of a line, in bytes. Chosen: a thumbnail with crops of all objects has a hundredth of it.
+const MAX_LINE_BYTES: usize = 64 << 20;
 
-/// The complete lines of a file, some at a time.
+/// A reader that returns some complete lines of a file at a time.
 pub(super) struct Pieces<'p> {
     path: &'p Path,
     file: File,
-    /// Bytes already read of a line that is not complete yet.
-    unread: Vec<u8>,
-    /// The place of the next line in the file, in bytes.
+    /// The beginning of the next line, which was read with the last piece.
+    rest: Vec<u8>,
+    /// The byte offset of the next line in the file.
     start: u64,
-    /// The number of lines before it.
+    /// The number of lines before the next line.
     lines: usize,
 }
 
 /// Some complete lines of a file.
 pub(super) struct Piece {
     bytes: Vec<u8>,
+    /// The byte offset of the first line in the file.
     start: u64,
+    /// The number of lines before the first line.
     lines: usize,
 }
 
-/// The place of a line in its file, with its end, in bytes.
+/// The place of a line in its file.
 #[derive(Debug, Clone, Copy)]
 pub struct LinePlace {
-    /// Offset of its first byte.
+    /// Byte offset of the line.
     pub start: u64,
-    /// Length with its end.
+    /// Length with the line end, in bytes.
     pub length: usize,
 }
 
 impl LinePlace {
-    /// Where the next line begins.
+    /// Byte offset of the next line.
     pub(super) fn end(self) -> u64 {
         self.start + self.length as u64
     }
 }
 
-/// One line that is not blank: a line that was set aside is.
+/// One line that is not blank. Lines that were set aside are blank.
 pub(super) struct FileLine<'p> {
-    /// Its number, from 1.
+    /// The line number, from 1.
     pub(super) number: usize,
-    /// The place of its first byte in the file.
+    /// The byte offset of the line in the file.
     pub(super) start: u64,
     /// The line with its end.
     pub(super) bytes: &'p [u8],
 }
 
-/// Opens a file to read it; `None` if there is no such file.
+/// Opens a file for reading; `None` if it does not exist.
 ///
 /// # Errors
 /// If it cannot be opened.
-pub(super) fn open_if_there(path: &Path) -> Result<Option<File>> {
+pub(super) fn open_if_exists(path: &Path) -> Result<Option<File>> {
     match reading::open(path) {
         Ok(file) => Ok(Some(file)),
         Err(e) if e.kind() == ErrorKind::NotFound => Ok(None),
@@ -71,37 +73,40 @@ pub(super) fn open_if_there(path: &Path) -> Result<Option<File>> {
 }
 
 impl<'p> Pieces<'p> {
-    /// Opens a file; `None` if there is no such file.
+    /// Opens a file; `None` if it does not exist.
     pub(super) fn open(path: &'p Path) -> Result<Option<Self>> {
-        Ok(open_if_there(path)?.map(|file| Self {
+        Ok(open_if_exists(path)?.map(|file| Self {
             path,
             file,
-            unread: Vec::new(),
+            rest: Vec::new(),
             start: 0,
             lines: 0,
         }))
     }
 
-    /// The next complete lines; `None` after the last. An incomplete last line is left out.
+    /// The next complete lines; `None` after the last. An incomplete last line is skipped.
     ///
     /// # Errors
     /// If the file cannot be read, or a line is longer than any line of a run.
     pub(super) fn next(&mut self) -> Result<Option<Piece>> {
-        let mut bytes = std::mem::take(&mut self.unread);
+        let mut bytes = std::mem::take(&mut self.rest);
         loop {
             let searched = bytes.len();
-            let read = (&self.file).take(PIECE_BYTES).read_to_end(&mut bytes);
-            if read.map_err(|e| Error::file(self.path, "read", e))? == 0 {
+            let read = (&self.file)
+                .take(PIECE_BYTES)
+                .read_to_end(&mut bytes)
+                .map_err(|e| Error::file(self.path, "read", e))?;
+            if read == 0 {
                 return Ok(None);
             }
             let end = bytes[searched..].iter().rposition(|byte| *byte == b'\n');
             if let Some(end) = end {
-                self.unread = bytes.split_off(searched + end + 1);
+                self.rest = bytes.split_off(searched + end + 1);
                 break;
             }
-            if bytes.len() > MOST_LINE {
+            if bytes.len() > MAX_LINE_BYTES {
                 let problem = format!(
-                    "longer than {MOST_LINE} bytes, which no line of a run is; restore the file"
+                    "longer than {MAX_LINE_BYTES} bytes, which no line of a run is; restore the file"
                 );
                 return Err(Error::line(self.path, self.lines + 1, problem));
             }
@@ -113,8 +118,8 @@ impl<'p> Pieces<'p> {
         };
         self.start += piece.bytes.len() as u64;
         #[expect(clippy::naive_bytecount, reason = "fast enough without a crate")]
-        let feeds = piece.bytes.iter().filter(|byte| **byte == b'\n').count();
-        self.lines += feeds;
+        let line_ends = piece.bytes.iter().filter(|byte| **byte == b'\n').count();
+        self.lines += line_ends;
         Ok(Some(piece))
     }
 }
@@ -143,10 +148,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_line_has_a_largest_length() {
+    fn too_long_lines_are_errors() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("lines");
-        let text = format!("one\n{}", "x".repeat(MOST_LINE + 1 + PIECE_BYTES as usize));
+        let text = format!(
+            "one\n{}",
+            "x".repeat(MAX_LINE_BYTES + 1 + PIECE_BYTES as usize)
+        );
         std::fs::write(&path, text).unwrap();
         let mut pieces = Pieces::open(&path).unwrap().unwrap();
         assert!(pieces.next().unwrap().is_some());
@@ -158,13 +166,12 @@ mod tests {
     }
 
     #[test]
-    fn all_complete_lines_are_read_with_their_places() {
+    fn complete_lines_are_read_with_their_places() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("lines");
         let long = "x".repeat(2 * PIECE_BYTES as usize);
         let mut text = format!("one\n   \n{long}\n");
-        let numbers = (0..700_000).map(|number| format!("{number}\n"));
-        text.extend(numbers);
+        text.extend((0..700_000).map(|number| format!("{number}\n")));
         std::fs::write(&path, text.clone() + "incomplete").unwrap();
         let mut pieces = Pieces::open(&path).unwrap().unwrap();
         let (mut seen, mut parts) = (Vec::new(), 0);

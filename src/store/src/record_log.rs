@@ -1,4 +1,4 @@
-//! The records of a run by their places in its file, so that none is held: [`RecordLog`].
+//! Random access to single records in the file of a run: [`RecordLog`].
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, ErrorKind, Read, Seek, SeekFrom};
@@ -6,17 +6,17 @@ use std::path::{Path, PathBuf};
 
 use super::folder::{QUESTIONS, RECORDS};
 use super::lines::each_placed_line;
-use super::pieces::{LinePlace, open_if_there};
+use super::pieces::{LinePlace, open_if_exists};
 use super::reread_record::RereadRecord;
 use super::trial_line::TrialLine;
 use darkqa_ground::error::{Error, Result};
 use darkqa_ground::types::Record;
 use darkqa_score::answers::record::Detail;
 
-/// The bytes that are read at once for a single line. Chosen: most lines are shorter.
+/// Buffer size for a single line, in bytes. Chosen: most lines are shorter.
 const LINE_BYTES: usize = 2048;
 
-/// The file of a run's records, to read single ones.
+/// The file of a run's records, open for random access.
 #[derive(Debug)]
 pub struct RecordLog {
     path: PathBuf,
@@ -27,23 +27,23 @@ impl RecordLog {
     /// Opens the records of a run folder.
     ///
     /// # Errors
-    /// If there are none.
+    /// If the file does not exist or cannot be opened.
     pub fn open(folder: &Path) -> Result<Self> {
-        Self::open_if_there(folder)?
+        Self::open_if_exists(folder)?
             .ok_or_else(|| Error::file(folder.join(RECORDS), "open", ErrorKind::NotFound.into()))
     }
 
-    /// Opens the records of a run folder; `None` if there are none.
+    /// Opens the records of a run folder; `None` if the file does not exist.
     ///
     /// # Errors
     /// If they cannot be opened.
-    pub fn open_if_there(folder: &Path) -> Result<Option<Self>> {
+    pub fn open_if_exists(folder: &Path) -> Result<Option<Self>> {
         let path = folder.join(RECORDS);
-        let file = open_if_there(&path)?;
+        let file = open_if_exists(&path)?;
         Ok(file.map(|file| Self { path, file }))
     }
 
-    /// The line that begins at a place, with its end.
+    /// The line at a byte offset, with its end.
     ///
     /// # Errors
     /// If the file cannot be read.
@@ -58,20 +58,19 @@ impl RecordLog {
             .map_err(|e| Error::file(&self.path, "read", e))
     }
 
-    /// The lines at these places, in their order. Neighbouring lines of the file are read together.
+    /// The lines at these places, in the order of `places`. Lines that are neighbours in the file are read together.
     ///
     /// # Errors
     /// If the file has become shorter.
     pub fn lines(&self, places: &[LinePlace]) -> Result<Vec<Vec<u8>>> {
         let mut in_file: Vec<usize> = (0..places.len()).collect();
         in_file.sort_unstable_by_key(|index| places[*index].start);
-        let follows = |one: &usize, next: &usize| places[*one].end() == places[*next].start;
         let mut lines = vec![Vec::new(); places.len()];
-        for together in in_file.chunk_by(follows) {
+        for together in in_file.chunk_by(|one, next| places[*one].end() == places[*next].start) {
             let start = places[together[0]].start;
             let length = together.iter().map(|index| places[*index].length).sum();
-            let block = bytes_at(&self.file, LinePlace { start, length });
-            let block = block.map_err(|e| Error::file(&self.path, "read", e))?;
+            let block = bytes_at(&self.file, LinePlace { start, length })
+                .map_err(|e| Error::file(&self.path, "read", e))?;
             for index in together {
                 let place = places[*index];
                 let at = (place.start - start) as usize;
@@ -90,7 +89,7 @@ impl RecordLog {
     }
 }
 
-/// The file of a run's questions, to read single lines.
+/// The file of a run's questions, open for random access.
 #[derive(Debug)]
 pub struct QuestionFile {
     path: PathBuf,
@@ -98,13 +97,13 @@ pub struct QuestionFile {
 }
 
 impl QuestionFile {
-    /// Opens the questions of a run folder; `None` if it stores none.
+    /// Opens the questions of a run folder; `None` if the file does not exist.
     ///
     /// # Errors
     /// If they cannot be opened.
     pub fn open(folder: &Path) -> Result<Option<Self>> {
         let path = folder.join(QUESTIONS);
-        let file = open_if_there(&path)?;
+        let file = open_if_exists(&path)?;
         Ok(file.map(|file| Self { path, file }))
     }
 
@@ -125,8 +124,8 @@ fn bytes_at(mut file: &File, place: LinePlace) -> std::io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Hands over what names the trial of each record of a run folder, in the order of the file, with the record's place; of a trial that was
-/// asked again all.
+/// Calls `take` with the identity of the trial of each record, in the order of the file, and with the record's place. A trial that was
+/// asked again occurs several times.
 ///
 /// # Errors
 /// If a line is not a record.
@@ -134,7 +133,8 @@ pub fn each_trial(folder: &Path, take: impl FnMut(TrialLine, LinePlace)) -> Resu
     each_placed_line(&folder.join(RECORDS), take)
 }
 
-/// Hands over all records of a run folder in the order of the file, each with its place; of a trial that was asked again all.
+/// Calls `take` with each record of a run folder in the order of the file, and with its place. A trial that was asked again occurs several
+/// times.
 ///
 /// # Errors
 /// If a line is not a record.
@@ -142,7 +142,7 @@ pub fn each_record<D: Detail>(folder: &Path, take: impl FnMut(Record<D>, LinePla
     each_placed_line(&folder.join(RECORDS), take)
 }
 
-/// Hands over all records of a run folder as [`each_record`], with their replies read again by the rules of this version.
+/// Calls `take` with each record as [`each_record`] does, after its reply was parsed again by the rules of this version.
 ///
 /// # Errors
 /// If a line is not a record, or the choices of a record are not valid.
@@ -160,27 +160,29 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_at_places_in_any_order_are_those_lines() {
+    fn lines_are_read_in_any_order() {
         let folder = tempfile::tempdir().unwrap();
         let lines: Vec<String> = (0..40)
             .map(|number| format!("{}\n", "x".repeat(number)))
             .collect();
         std::fs::write(folder.path().join(RECORDS), lines.concat()).unwrap();
         let log = RecordLog::open(folder.path()).unwrap();
-        let place = |index: usize| LinePlace {
-            start: lines[..index].iter().map(|line| line.len() as u64).sum(),
-            length: lines[index].len(),
-        };
+        let all: Vec<LinePlace> = (0..lines.len())
+            .map(|index| LinePlace {
+                start: lines[..index].iter().map(|line| line.len() as u64).sum(),
+                length: lines[index].len(),
+            })
+            .collect();
         for order in [vec![], vec![5], vec![7, 3, 4, 5, 39, 0], (0..40).collect()] {
-            let places: Vec<LinePlace> = order.iter().map(|index| place(*index)).collect();
+            let places: Vec<LinePlace> = order.iter().map(|index| all[*index]).collect();
             let read = log.lines(&places).unwrap();
             let expected = order.iter().map(|index| lines[*index].clone().into_bytes());
             assert!(read.into_iter().eq(expected), "{order:?}");
         }
-        let behind = LinePlace {
+        let beyond = LinePlace {
             start: 1_000,
             length: 2,
         };
-        assert!(log.lines(&[place(0), behind]).is_err());
+        assert!(log.lines(&[all[0], beyond]).is_err());
     }
 }

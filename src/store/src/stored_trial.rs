@@ -1,4 +1,4 @@
-//! [`StoredTrial`]: the part of a stored trial that a resumed run needs.
+//! [`StoredTrial`]: the fields of a stored trial that a resumed run needs.
 
 use std::num::NonZeroU32;
 
@@ -15,13 +15,13 @@ pub struct StoredTrial {
     pub key: TrialKey,
     /// The name of the model.
     pub model: Shared<String>,
-    /// The way by which it was asked.
+    /// The way in which the model was asked.
     #[serde(default)]
     pub via: Via,
     failure: Option<IgnoredAny>,
     #[serde(default, rename = "finish", deserialize_with = "is_length")]
     is_truncated: bool,
-    /// The limit of the reply's tokens, if it is larger than that of the run's first call.
+    /// The token limit of the reply, if it exceeds that of the run's first call.
     max_tokens: Option<NonZeroU32>,
     #[serde(default)]
     usage: Tokens,
@@ -32,12 +32,12 @@ pub struct StoredTrial {
 }
 
 impl StoredTrial {
-    /// Whether no reply came, so that the trial is asked again.
+    /// True if no reply came, so that the trial is asked again.
     pub fn failed(&self) -> bool {
         self.failure.is_some()
     }
 
-    /// Whether the reply was truncated at a limit below this one.
+    /// True if the reply was truncated at a token limit below this one.
     pub fn is_truncated_below(&self, limit: u32) -> bool {
         self.is_truncated && !self.failed() && self.limit() < Some(limit)
     }
@@ -56,14 +56,17 @@ impl StoredTrial {
         self.lost.as_ref().map_or(0, |lost| lost.attempts)
     }
 
-    /// These attempts, and the requests without a token count from the server; `None` if there are none.
+    /// The attempts that were charged and gave no reply, and the requests without a token count; `None` without such attempts and requests.
     pub fn lost(&self) -> Option<&LostAttempts> {
         self.lost.as_deref()
     }
 
-    /// Adds the cost of an earlier record of the same trial; the latest record comes first. An earlier record may be the same reply, parsed
-    /// differently, whose attempts are the same; or a reply with a smaller limit; or one that this record failed to replace.
-    pub(super) fn follow(&mut self, earlier: &Self) {
+    /// Merges an earlier record of the same trial into this one, and adds its cost. Must be called with the latest of the earlier records
+    /// first.
+    ///
+    /// The earlier record may be the same reply, parsed by other rules, whose attempts are not counted twice; a reply with a smaller token
+    /// limit; or a reply that this record failed to replace.
+    pub(super) fn add_earlier(&mut self, earlier: &Self) {
         let own = self.lost.as_deref().copied().unwrap_or_default();
         let before = earlier.lost.as_deref().copied().unwrap_or_default();
         let mut lost = own;
@@ -85,7 +88,7 @@ impl StoredTrial {
     }
 }
 
-/// Whether a reason why a model stopped is the token limit.
+/// Deserializes the reason why a model stopped; true for the token limit.
 fn is_length<'de, D: Deserializer<'de>>(deserializer: D) -> Result<bool, D::Error> {
     let finish = Option::<Finish>::deserialize(deserializer)?;
     Ok(finish == Some(Finish::Length))
@@ -105,30 +108,23 @@ mod tests {
     }
 
     #[test]
-    fn attempts_of_all_calls_are_added_once() {
+    fn attempts_are_added_once() {
         let mut last = trial("null", 1);
-        last.follow(&trial("{}", 2));
-        last.follow(&trial("null", 1));
+        last.add_earlier(&trial("{}", 2));
+        last.add_earlier(&trial("null", 1));
         assert_eq!(last.lost_attempts(), 3, "another reading repeats its own");
         assert_eq!(last.lost().unwrap().usage.prompt_tokens, Some(300));
     }
 
     #[test]
-    fn a_truncated_reply_is_paid_for_besides_the_next() {
-        let reply = |limit: &str, finish: &str| -> StoredTrial {
-            let key = "0".repeat(32);
-            let line = format!(
-                r#"{{"key":"{key}","model":"m","failure":null,"finish":"{finish}","max_tokens":{limit},"usage":{{"prompt_tokens":10,"completion_tokens":5}}}}"#
-            );
-            serde_json::from_str(&line).unwrap()
-        };
+    fn truncated_replies_are_charged() {
         let first = reply("null", "length");
         assert!(
             first.is_truncated_below(2000) && !reply("2000", "length").is_truncated_below(2000)
         );
         assert!(!reply("null", "stop").is_truncated_below(2000));
         let mut last = reply("2000", "stop");
-        last.follow(&first);
+        last.add_earlier(&first);
         assert_eq!(
             (
                 last.lost_attempts(),
@@ -137,9 +133,17 @@ mod tests {
             (1, Some(10))
         );
         let mut failed = trial("{}", 2);
-        failed.follow(&first);
+        failed.add_earlier(&first);
         assert!(!failed.failed() && failed.is_truncated_below(2000));
         assert_eq!(failed.lost_attempts(), 2);
+    }
+
+    fn reply(limit: &str, finish: &str) -> StoredTrial {
+        let key = "0".repeat(32);
+        let line = format!(
+            r#"{{"key":"{key}","model":"m","failure":null,"finish":"{finish}","max_tokens":{limit},"usage":{{"prompt_tokens":10,"completion_tokens":5}}}}"#
+        );
+        serde_json::from_str(&line).unwrap()
     }
 
     #[test]

@@ -54,7 +54,7 @@ fn record(name: &str, outcome: TrialOutcome) -> Record {
 }
 
 #[test]
-fn a_run_of_another_schema_is_refused_with_its_reason() {
+fn runs_with_another_schema_are_refused() {
     let base = tempfile::tempdir().unwrap();
     for (schema, expected) in [
         (
@@ -104,7 +104,7 @@ fn only_the_last_record_of_each_trial_is_read() {
 }
 
 #[test]
-fn an_incomplete_last_line_is_removed_and_a_broken_line_is_set_aside() {
+fn damaged_lines_are_removed_or_set_aside() {
     let base = tempfile::tempdir().unwrap();
     let mut store = Store::open(base.path(), &manifest(0), AddressChange::Refused).unwrap();
     store.append(&record("a", TrialOutcome::Right)).unwrap();
@@ -129,9 +129,8 @@ fn an_incomplete_last_line_is_removed_and_a_broken_line_is_set_aside() {
         error.contains("records.jsonl, line 1: not a record"),
         "{error}"
     );
-    // The run goes on without the line, which is kept, and whose place is blank.
-    let open = || Store::open(base.path(), &manifest(0), AddressChange::Refused);
-    let mut store = open().unwrap();
+    // The run continues without the line, which is moved to another file and blanked.
+    let mut store = reopen(base.path()).unwrap();
     assert_eq!(store.records().unwrap().len(), 1);
     let aside = fs::read_to_string(base.path().join(SET_ASIDE)).unwrap();
     assert!(
@@ -140,23 +139,27 @@ fn an_incomplete_last_line_is_removed_and_a_broken_line_is_set_aside() {
     );
     store.append(&record("a", TrialOutcome::Right)).unwrap();
     drop(store);
-    assert_eq!(open().unwrap().records().unwrap().len(), 2);
+    assert_eq!(reopen(base.path()).unwrap().records().unwrap().len(), 2);
     assert_eq!(
         fs::read_to_string(base.path().join(SET_ASIDE)).unwrap(),
         aside
     );
     assert_eq!(read_records::<ChoiceDetail>(base.path()).unwrap().len(), 2);
-    // A file of something else is no run with damage.
+    // A file without any record is another file, not a damaged run.
     fs::write(&path, "{}\n[]\n").unwrap();
-    let error = open().unwrap_err().to_string();
+    let error = reopen(base.path()).unwrap_err().to_string();
     assert!(
         error.contains("records.jsonl, line 1: not a record"),
         "{error}"
     );
 }
 
+fn reopen(folder: &Path) -> Result<Store> {
+    Store::open(folder, &manifest(0), AddressChange::Refused)
+}
+
 #[test]
-fn another_run_is_refused_and_the_flag_that_differs_is_named() {
+fn other_runs_are_refused_by_the_differing_flag() {
     let base = tempfile::tempdir().unwrap();
     drop(Store::open(base.path(), &manifest(0), AddressChange::Refused).unwrap());
     let error = Store::open(base.path(), &manifest(7), AddressChange::Refused)
@@ -169,7 +172,7 @@ fn another_run_is_refused_and_the_flag_that_differs_is_named() {
 }
 
 #[test]
-fn a_run_is_locked_by_one_process_and_a_folder_with_other_files_is_refused() {
+fn locked_runs_and_folders_with_files_are_refused() {
     let base = tempfile::tempdir().unwrap();
     let _lock = Store::open(base.path(), &manifest(0), AddressChange::Refused).unwrap();
     assert!(
@@ -189,18 +192,11 @@ fn a_run_is_locked_by_one_process_and_a_folder_with_other_files_is_refused() {
 }
 
 #[test]
-fn a_run_continues_at_another_address_only_if_allowed() {
-    let at = |address: &str| {
-        let mut manifest = manifest(0);
-        let model = [("m".to_owned(), serde_json::json!({ "--base-url": address }))];
-        manifest.columns.insert("model".to_owned(), model.into());
-        manifest
-    };
+fn address_changes_need_permission() {
     let base = tempfile::tempdir().unwrap();
-    let open = |address| Store::open(base.path(), &at(address), AddressChange::Refused).unwrap();
-    drop(open("typo"));
-    // Without a reply, another address is no other run.
-    let mut store = open("here");
+    drop(Store::open(base.path(), &at("typo"), AddressChange::Refused).unwrap());
+    // Without a reply, the address may change.
+    let mut store = Store::open(base.path(), &at("here"), AddressChange::Refused).unwrap();
     store.append(&record("a", TrialOutcome::Right)).unwrap();
     drop(store);
     assert!(Store::open(base.path(), &at("there"), AddressChange::Allowed).is_ok());
@@ -208,8 +204,16 @@ fn a_run_continues_at_another_address_only_if_allowed() {
     assert!(error.to_string().contains("--resume"), "{error}");
 }
 
+/// The manifest of a run with a model at this address.
+fn at(address: &str) -> RunManifest {
+    let mut manifest = manifest(0);
+    let model = [("m".to_owned(), serde_json::json!({ "--base-url": address }))];
+    manifest.columns.insert("model".to_owned(), model.into());
+    manifest
+}
+
 #[test]
-fn unfinished_files_of_a_killed_process_do_not_matter() {
+fn unfinished_files_are_ignored() {
     let base = tempfile::tempdir().unwrap();
     fs::write(base.path().join(".manifest.json.part"), "{").unwrap();
     assert!(Store::open(base.path(), &manifest(0), AddressChange::Refused).is_ok());

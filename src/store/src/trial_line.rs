@@ -1,4 +1,4 @@
-//! [`TrialLine`]: the part of a record from which the position of its trial follows.
+//! [`TrialLine`]: the fields of a record that identify its trial.
 
 use serde::Deserialize;
 

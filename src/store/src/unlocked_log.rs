@@ -1,4 +1,4 @@
-//! The log of a run on a file system without locks: [`UnlockedLog`] finds records that another process writes.
+//! [`UnlockedLog`]: detection of a second process that writes to a run, for file systems without locks.
 
 use std::fs::{self, File};
 use std::io;
@@ -9,10 +9,10 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use darkqa_ground::error::{Error, Result};
 use darkqa_ground::files;
 
-/// The file of a run folder that names the process that last began to write.
+/// The marker file in a run folder, which names the process that last began to write.
 const WRITER: &str = "writer.txt";
 
-/// The state of the log as this process knows it.
+/// The length of the log that this process expects, and any other writer that it found.
 #[derive(Debug)]
 pub(super) struct UnlockedLog {
     marker: PathBuf,
@@ -27,20 +27,22 @@ pub(super) struct UnlockedLog {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum OtherWriter {
     None,
-    /// It started earlier, so that this process stops.
+    /// A process that started earlier: this process stops.
     Earlier,
-    /// It started later, so that it stops.
+    /// A process that started later: the other process stops.
     Later,
 }
 
 impl UnlockedLog {
-    /// Notes that this process begins to write to the log of a run folder, and warns that there are no locks.
+    /// Writes the marker of this process into a run folder, and warns that the file system has no locks.
     ///
     /// # Errors
-    /// If the note cannot be written.
+    /// If the marker cannot be written.
     pub(super) fn begin(folder: &Path, log: &File, problem: &io::Error) -> Result<Self> {
-        let now = SystemTime::now().duration_since(UNIX_EPOCH);
-        let now = now.unwrap_or_default().as_nanos();
+        let now = SystemTime::now()
+            .duration_since(UNIX_EPOCH)
+            .unwrap_or_default()
+            .as_nanos();
         let begun = Self {
             marker: folder.join(WRITER),
             name: format!("process {}, {now} ns\n", process::id()),
@@ -56,8 +58,8 @@ impl UnlockedLog {
         Ok(begun)
     }
 
-    /// Looks for records of another process before this one appends `bytes` bytes.
-    pub(super) fn appends(&mut self, log: &File, bytes: usize) {
+    /// Checks for records of another process. Must be called before this process appends `bytes` bytes.
+    pub(super) fn before_append(&mut self, log: &File, bytes: usize) {
         let length = log.metadata().map_or(self.end, |log| log.len());
         if length != self.end && self.found == OtherWriter::None {
             self.found = if self.is_last() {
@@ -89,7 +91,7 @@ impl UnlockedLog {
 impl Drop for UnlockedLog {
     fn drop(&mut self) {
         if self.is_last() {
-            // It is only a note.
+            // A remaining marker does no harm.
             let _ = fs::remove_file(&self.marker);
         }
     }
@@ -103,20 +105,22 @@ mod tests {
     use super::*;
 
     fn begin(folder: &Path) -> (UnlockedLog, File) {
-        let mut options = OpenOptions::new();
-        let log = options.append(true).create(true);
-        let log = log.open(folder.join("records.jsonl")).unwrap();
+        let log = OpenOptions::new()
+            .append(true)
+            .create(true)
+            .open(folder.join("records.jsonl"))
+            .unwrap();
         let problem = io::Error::from(io::ErrorKind::Unsupported);
         (UnlockedLog::begin(folder, &log, &problem).unwrap(), log)
     }
 
     fn append((log, file): &mut (UnlockedLog, File)) {
-        log.appends(file, 3);
+        log.before_append(file, 3);
         file.write_all(b"{}\n").unwrap();
     }
 
     #[test]
-    fn the_process_that_started_later_stops() {
+    fn later_process_stops() {
         let folder = tempfile::tempdir().unwrap();
         let mut first = begin(folder.path());
         append(&mut first);
@@ -132,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn a_process_alone_goes_on() {
+    fn single_process_continues() {
         let folder = tempfile::tempdir().unwrap();
         for _ in 0..2 {
             let mut alone = begin(folder.path());

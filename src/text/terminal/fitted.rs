@@ -7,25 +7,25 @@ use comfy_table::{CellAlignment, ColumnConstraint, LineStyle, Width};
 use unicode_width::UnicodeWidthStr;
 
 use crate::text::table::ColumnKind;
-use crate::text::words::shortened;
+use crate::text::words::shorten_middle;
 
-/// Columns of the terminal that a cell takes besides its text, the gap to the next one included.
+/// Terminal columns of a cell in addition to its text, with the gap to the next cell.
 const PADDING: usize = 3;
-/// Least length of a shortened name; chosen.
-const LEAST_NAME: usize = 12;
-/// Columns of names of models.
+/// Minimum length of a shortened name; chosen.
+const MIN_NAME: usize = 12;
+/// Heads of columns with names of models.
 const MODELS: [&str; 2] = ["model", "less"];
-/// Columns that are left out where no row has a number but 0.
+/// Heads of columns that may be left out if all their numbers are 0.
 const ZEROS: [&str; 2] = ["unparsed", "failed"];
 
-/// A column of text.
+/// A column of a table of text.
 #[derive(Debug, Clone)]
 pub(super) struct TextColumn {
     pub(super) head: String,
     pub(super) kind: ColumnKind,
 }
 
-/// A row of text.
+/// A row of a table of text.
 #[derive(Debug, Clone)]
 pub(super) enum TextRow {
     /// A heading above the rows that follow.
@@ -41,14 +41,14 @@ pub(super) struct TextTable {
     pub(super) rows: Vec<TextRow>,
 }
 
-/// The width to which texts may be wrapped that name no row; chosen.
+/// Width to which a column of text may be wrapped; chosen.
 const WRAPPED: usize = 24;
 
 impl TextTable {
-    /// The table in lines of at most `most` columns, as far as its longest text allows. Where it is wider, names of models lose their
-    /// middle, columns of zeros become a line below it, and at last its columns are printed in several parts, each with the texts that
-    /// name its rows.
-    pub(super) fn fitted(mut self, most: usize) -> String {
+    /// Formats the table in lines of at most `most` terminal columns, if its longest text allows that. A wider table is changed step by
+    /// step: names of models lose their middle, columns of zeros become a note below it, and finally it is split into several parts, each
+    /// with the texts that name its rows.
+    pub(super) fn format_to(mut self, most: usize) -> String {
         if self
             .rows
             .iter()
@@ -61,11 +61,14 @@ impl TextTable {
             self.shorten_models(most);
         }
         if self.width() > most {
-            note = self.leave_out_zeros();
+            note = self.remove_zeros();
         }
-        let parts = self.parts(most);
-        let printed: Vec<String> = parts.iter().map(|part| self.print(part, most)).collect();
-        printed.concat() + &note
+        let parts: String = self
+            .parts(most)
+            .iter()
+            .map(|part| self.format_columns(part, most))
+            .collect();
+        parts + &note
     }
 
     fn cells(&self) -> impl Iterator<Item = &Vec<String>> {
@@ -82,7 +85,7 @@ impl TextTable {
             .iter()
             .filter_map(|row| match row {
                 TextRow::Cells(cells) => Some(cells.get(column)?.width()),
-                // A heading stands in the first column.
+                // A heading is printed in the first column.
                 TextRow::Heading(heading) => (column == 0).then(|| heading.width() + 2),
             })
             .max()
@@ -97,43 +100,48 @@ impl TextTable {
             .saturating_sub(1)
     }
 
-    /// Shortens the names of models as far as that makes the table fit, and as far as they stay apart.
+    /// Shortens the names of models until the table fits, but never so far that two of them become equal.
     fn shorten_models(&mut self, most: usize) {
         for column in 0..self.columns.len() {
             let over = self.width().saturating_sub(most);
             if !MODELS.contains(&&*self.columns[column].head) || over == 0 {
                 continue;
             }
-            let names = self.cells().filter_map(|cells| cells.get(column));
-            let names: BTreeSet<String> = names.cloned().collect();
+            let names: BTreeSet<String> = self
+                .cells()
+                .filter_map(|cells| cells.get(column))
+                .cloned()
+                .collect();
             let longest = names.iter().map(|name| name.width()).max().unwrap_or(0);
-            let least = longest.saturating_sub(over).max(LEAST_NAME);
-            let differ = |length: &usize| {
-                names
-                    .iter()
-                    .map(|name| shortened(name, *length))
-                    .collect::<BTreeSet<String>>()
-                    .len()
-                    == names.len()
-            };
-            let length = (least..longest).find(differ).unwrap_or(longest);
+            let least = longest.saturating_sub(over).max(MIN_NAME);
+            let length = (least..longest)
+                .find(|length| {
+                    let shortened: BTreeSet<String> = names
+                        .iter()
+                        .map(|name| shorten_middle(name, *length))
+                        .collect();
+                    shortened.len() == names.len()
+                })
+                .unwrap_or(longest);
             for row in &mut self.rows {
                 if let TextRow::Cells(cells) = row
                     && let Some(cell) = cells.get_mut(column)
                 {
-                    *cell = shortened(cell, length);
+                    *cell = shorten_middle(cell, length);
                 }
             }
         }
     }
 
-    /// Takes the columns of zeros out; a line that states it, empty without any.
-    fn leave_out_zeros(&mut self) -> String {
+    /// Removes the columns of zeros. Returns a line that names them; empty if there are none.
+    fn remove_zeros(&mut self) -> String {
         let mut names = Vec::new();
         for column in (0..self.columns.len()).rev() {
-            let is_zero = |cells: &Vec<String>| cells.get(column).is_none_or(|cell| cell == "0");
             let head = &self.columns[column].head;
-            if !ZEROS.contains(&&**head) || !self.cells().all(is_zero) {
+            let is_zero = self
+                .cells()
+                .all(|cells| cells.get(column).is_none_or(|cell| cell == "0"));
+            if !ZEROS.contains(&&**head) || !is_zero {
                 continue;
             }
             names.insert(0, format!("{head} 0"));
@@ -152,16 +160,11 @@ impl TextTable {
         }
     }
 
-    /// The columns of each part. The texts at the left, which name the rows, stand in every part; on a narrow terminal as many of them as
-    /// leave room for another column. Longer texts are wrapped.
+    /// The columns of each part. The texts at the left, which name the rows, are repeated in every part; on a narrow terminal only as many
+    /// of them as leave room for another column. Longer texts are wrapped.
     fn parts(&self, most: usize) -> Vec<Vec<usize>> {
-        // The last cell has no gap behind it.
+        // The last cell has no gap after it.
         let most = most + 1;
-        let width_to = |end: usize| (0..end).map(|column| self.width_of(column)).sum::<usize>();
-        let has_room = |names: usize| {
-            let widest = (names..self.columns.len()).map(|column| self.least_width_of(column));
-            width_to(names) + widest.max().unwrap_or(0) <= most
-        };
         let texts = self
             .columns
             .iter()
@@ -170,9 +173,14 @@ impl TextTable {
             .min(self.columns.len().saturating_sub(1));
         let names = (1..=texts)
             .rev()
-            .find(|names| has_room(*names))
+            .find(|names| {
+                let widest = (*names..self.columns.len())
+                    .map(|column| self.least_width_of(column))
+                    .max();
+                self.width_of_first(*names) + widest.unwrap_or(0) <= most
+            })
             .unwrap_or(texts.min(1));
-        let named = width_to(names);
+        let named = self.width_of_first(names);
         let mut parts: Vec<Vec<usize>> = Vec::new();
         let mut width = 0;
         for column in names..self.columns.len() {
@@ -192,7 +200,12 @@ impl TextTable {
         parts
     }
 
-    /// The width that a column needs at least: a text may be wrapped.
+    /// The width of the first columns with their padding.
+    fn width_of_first(&self, count: usize) -> usize {
+        (0..count).map(|column| self.width_of(column)).sum()
+    }
+
+    /// The minimum width of a column, whose texts may be wrapped.
     fn least_width_of(&self, column: usize) -> usize {
         let width = self.width_of(column);
         match self.columns[column].kind {
@@ -201,8 +214,8 @@ impl TextTable {
         }
     }
 
-    /// The columns as lines; where they are wider than `most`, the last text is wrapped.
-    fn print(&self, columns: &[usize], most: usize) -> String {
+    /// Formats some of the columns; if they are wider than `most`, the last text is wrapped.
+    fn format_columns(&self, columns: &[usize], most: usize) -> String {
         let mut grid = comfy_table::Table::new();
         grid.load_style(UTF8_HORIZONTAL_ONLY.row_separator(LineStyle::none()));
         let heads = columns
@@ -233,7 +246,7 @@ impl TextTable {
         }
         let width: usize = columns.iter().map(|column| self.width_of(*column)).sum();
         let last = columns.last().copied().unwrap_or_default();
-        // The last cell has no gap behind it, but a wrapped one has.
+        // The last cell has no gap after it, unless it is wrapped.
         let over = width.saturating_sub(most);
         if over > 1 && self.columns[last].kind == ColumnKind::Text {
             let room = self.width_of(last).saturating_sub(over).max(WRAPPED);
@@ -252,37 +265,43 @@ mod tests {
 
     /// A table of six models of 30 letters at six levels.
     fn table() -> TextTable {
-        let column = |head: &str, kind| TextColumn {
+        let heads = [
+            ("model", ColumnKind::Text),
+            ("light", ColumnKind::Text),
+            ("L0", ColumnKind::Accuracy),
+            ("L1", ColumnKind::Accuracy),
+            ("L2", ColumnKind::Accuracy),
+            ("L3", ColumnKind::Accuracy),
+            ("L4", ColumnKind::Accuracy),
+            ("L5", ColumnKind::Accuracy),
+            ("n", ColumnKind::Count),
+            ("unparsed", ColumnKind::Count),
+            ("failed", ColumnKind::Count),
+        ];
+        let columns = heads.into_iter().map(|(head, kind)| TextColumn {
             head: head.to_owned(),
             kind,
-        };
-        let levels = (0..6).map(|level| column(&format!("L{level}"), ColumnKind::Accuracy));
-        let columns = [
-            column("model", ColumnKind::Text),
-            column("light", ColumnKind::Text),
-        ];
-        let counts = ["n", "unparsed", "failed"].map(|head| column(head, ColumnKind::Count));
-        let row = |model: usize| {
-            let names = [
+        });
+        let mut rows = vec![TextRow::Heading("a group".to_owned())];
+        for model in 0..6 {
+            let mut cells = vec![
                 format!("a-model-with-30-letters-b72-{model:02}"),
                 "with noise + lift".to_owned(),
             ];
-            let levels = (0..6).map(|level| format!("{}.{level}", 90 - model));
-            let counts = ["9999", "0", "0"].map(str::to_owned);
-            TextRow::Cells(names.into_iter().chain(levels).chain(counts).collect())
-        };
+            cells.extend((0..6).map(|level| format!("{}.{level}", 90 - model)));
+            cells.extend(["9999", "0", "0"].map(str::to_owned));
+            rows.push(TextRow::Cells(cells));
+        }
         TextTable {
-            columns: columns.into_iter().chain(levels).chain(counts).collect(),
-            rows: std::iter::once(TextRow::Heading("a group".to_owned()))
-                .chain((0..6).map(row))
-                .collect(),
+            columns: columns.collect(),
+            rows,
         }
     }
 
     #[test]
-    fn no_line_is_wider_than_the_terminal_and_no_number_is_lost() {
+    fn tables_fit_the_terminal_and_keep_all_numbers() {
         for most in [60, 80, 100, 140] {
-            let text = table().fitted(most);
+            let text = table().format_to(most);
             let widest = text.lines().map(UnicodeWidthStr::width).max().unwrap();
             assert!(widest <= most, "{most}: {widest}\n{text}");
             for number in [
@@ -295,12 +314,12 @@ mod tests {
             ] {
                 assert!(text.contains(number), "{most}: {number}\n{text}");
             }
-            // What is left out is said.
+            // A column of zeros is named even if it is removed.
             assert!(text.contains("unparsed"), "{text}");
         }
-        let wide = table().fitted(140);
+        let wide = table().format_to(140);
         assert!(wide.contains("a-model-with-30-letters-b72-03") && !wide.contains("in every row"));
-        let narrow = table().fitted(80);
+        let narrow = table().format_to(80);
         assert!(
             narrow.contains("unparsed 0, failed 0 in every row"),
             "{narrow}"
@@ -313,15 +332,16 @@ mod tests {
         if let TextRow::Cells(cells) = &mut table.rows[3] {
             cells[9] = "7".to_owned();
         }
-        let text = table.fitted(60);
+        let text = table.format_to(60);
         assert!(
             text.contains('7') && text.contains("failed 0 in every row"),
             "{text}"
         );
         assert!(!text.contains("unparsed 0"), "{text}");
     }
+
     #[test]
-    fn every_part_tells_its_rows_apart() {
+    fn every_part_names_its_rows() {
         let mut table = table();
         table.columns.push(TextColumn {
             head: "reason".to_owned(),
@@ -334,7 +354,7 @@ mod tests {
                 cells.push("a reason that takes a line of its own, which is 60 letters".to_owned());
             }
         }
-        let text = table.fitted(80);
+        let text = table.format_to(80);
         let widest = text.lines().map(UnicodeWidthStr::width).max().unwrap();
         assert!(widest <= 80, "{text}");
         let reasons: Vec<&str> = text

@@ -1,4 +1,4 @@
-//! A letter with the text of another choice, wherever it stands: [`contradiction`].
+//! [`contradiction`]: a letter with the text of another choice, anywhere in a reply.
 
 use crate::names::{Delimiting, Name};
 use crate::text::Boundary;
@@ -6,20 +6,20 @@ use crate::text::words::Role;
 use crate::view::ReplyView;
 use darkqa_ground::types::questions::{Answer, UnreadReason};
 
-/// A letter with the text of another choice: "B. bathroom", "kitchen (C)", "I choose D, the kitchen".
+/// Unparsed if any letter has the text of another choice: "B. bathroom", "kitchen (C)", "I choose D, the kitchen".
 pub(super) fn contradiction(view: &ReplyView<'_>) -> Option<Answer> {
-    let wrong = view.names.letters.iter().find(|letter| {
+    let contradicted = view.names.letters.iter().find(|letter| {
         letter.state.counts()
             && paired_text(view, letter).is_some_and(|text| text.choice != letter.choice)
     });
-    let reason = match wrong?.choice {
+    let reason = match contradicted?.choice {
         Some(_) => UnreadReason::Contradiction,
         None => UnreadReason::OutOfRange,
     };
     Some(Answer::Unparsed(reason))
 }
 
-/// The text that stands with a letter as its label or in apposition.
+/// The text that a letter labels, or that is in apposition to it.
 fn paired_text(view: &ReplyView<'_>, letter: &Name) -> Option<Name> {
     if let Some(text) = view
         .names
@@ -38,27 +38,27 @@ fn paired_text(view: &ReplyView<'_>, letter: &Name) -> Option<Name> {
         return view
             .names
             .labelled_text(letter)
-            .or_else(|| explained(view, letter))
-            .or_else(|| text_apposed(view, letter));
+            .or_else(|| explained_text(view, letter))
+            .or_else(|| text_before(view, letter));
     }
-    apposed_text(view, letter).or_else(|| text_apposed(view, letter))
+    text_after(view, letter).or_else(|| text_before(view, letter))
 }
 
-/// The text behind a letter that no bracket marks, with nothing but a comma, a dash or a colon between them, at the end of a
-/// part of a clause: "I choose D, the kitchen."
-fn apposed_text(view: &ReplyView<'_>, letter: &Name) -> Option<Name> {
-    if let Some(text) = explained(view, letter) {
+/// The text after a letter without brackets, separated only by a comma, a dash or a colon, at the end of a part of a clause: "I choose D,
+/// the kitchen."
+fn text_after(view: &ReplyView<'_>, letter: &Name) -> Option<Name> {
+    if let Some(text) = explained_text(view, letter) {
         return Some(text);
     }
     let text = view.names.labelled_text(letter)?;
     let gap = &view.text[letter.end..text.start];
     let signs = [',', '-', '–', '—', ':', '.', ')', '=', '→'];
-    let signed = gap.trim_start().starts_with(signs);
-    (signed && ends_part(view, text.end)).then_some(text)
+    let has_sign = gap.trim_start().starts_with(signs);
+    (has_sign && ends_part(view, text.end)).then_some(text)
 }
 
-/// The text behind a letter with words such as "i.e." between them: "B, which is the kitchen".
-fn explained(view: &ReplyView<'_>, letter: &Name) -> Option<Name> {
+/// The text after a letter and words such as "i.e.": "B, which is the kitchen".
+fn explained_text(view: &ReplyView<'_>, letter: &Name) -> Option<Name> {
     let elements = &view.clauses.elements;
     let mut at = view.clauses.index(letter.end);
     at += usize::from(view.clauses.is_sign(at, &[')', ']']));
@@ -71,8 +71,8 @@ fn explained(view: &ReplyView<'_>, letter: &Name) -> Option<Name> {
     text.state.counts().then_some(text)
 }
 
-/// The text before a letter, with a comma or a dash and perhaps "option" between them: "the kitchen, option C."
-fn text_apposed(view: &ReplyView<'_>, letter: &Name) -> Option<Name> {
+/// The text before a letter, separated by a comma or a dash and perhaps "option": "the kitchen, option C."
+fn text_before(view: &ReplyView<'_>, letter: &Name) -> Option<Name> {
     let elements = &view.clauses.elements;
     let mut at = view.clauses.index(letter.start);
     let mut called = false;
@@ -88,13 +88,15 @@ fn text_apposed(view: &ReplyView<'_>, letter: &Name) -> Option<Name> {
     let joined = view
         .clauses
         .is_sign(sign, &[',', '-', '–', '—', '=', '→', ':', '(', '[']);
-    let text = view.names.text_to(elements[sign.checked_sub(1)?].end)?;
+    let text = view
+        .names
+        .text_ending_at(elements[sign.checked_sub(1)?].end)?;
     let ends = ends_part(view, letter.end) && view.names.labelled_text(letter).is_none();
     let alone = called || !view.clauses.is_sign(sign, &[',']) || at_clause_end(view, letter.end);
     (joined && ends && alone && text.state.counts()).then_some(text)
 }
 
-/// Whether a part of a clause ends at a byte.
+/// True if a part of a clause ends at a byte.
 fn ends_part(view: &ReplyView<'_>, end: usize) -> bool {
     let next = view.clauses.elements.get(view.clauses.index(end));
     next.is_none_or(|next| {
@@ -102,8 +104,8 @@ fn ends_part(view: &ReplyView<'_>, end: usize) -> bool {
     })
 }
 
-/// Whether a clause ends at a byte.
+/// True if a clause ends at a byte.
 fn at_clause_end(view: &ReplyView<'_>, end: usize) -> bool {
     let next = view.clauses.elements.get(view.clauses.index(end));
-    next.is_none_or(crate::text::Element::cuts)
+    next.is_none_or(crate::text::Element::ends_clause)
 }

@@ -1,7 +1,7 @@
-//! A first line that is an answer by itself: [`first_line`].
+//! [`first_line`]: a first line that is an answer on its own.
 
 use super::strict;
-use crate::names::{Delimiting, Name, NameState};
+use crate::names::{Delimiting, NameState};
 use crate::text::words::Role;
 use crate::view::ReplyView;
 use darkqa_ground::types::questions::{Answer, UnreadReason};
@@ -10,11 +10,7 @@ use darkqa_ground::types::questions::{Answer, UnreadReason};
 /// retraction ("On reflection, it is C").
 pub(super) fn first_line(view: &ReplyView<'_>) -> Option<Answer> {
     let (line, rest) = view.text.split_once('\n')?;
-    let read = |line: &str| match strict::read(line.trim(), &view.offered.texts) {
-        Some(Answer::Chosen(index)) => Some(index),
-        _ => None,
-    };
-    let index = read(line)?;
+    let index = strict_choice(view, line)?;
     if view.state(0) == NameState::Repeated {
         return None;
     }
@@ -22,25 +18,35 @@ pub(super) fn first_line(view: &ReplyView<'_>) -> Option<Answer> {
     let mut differs = false;
     for other in rest.lines() {
         let listed = view.state(at) != NameState::Affirmed;
-        differs |= !listed && other != line && read(other).is_some_and(|other| other != index);
+        differs |= !listed
+            && other != line
+            && strict_choice(view, other).is_some_and(|other| other != index);
         at += other.len() + 1;
     }
-    let names_other = |name: &Name| {
-        name.choice != Some(index) && name.delimiting > Delimiting::Loose && name.is_affirmed()
-    };
-    let taken_back = view
+    let is_retracted = view
         .clauses
         .elements
         .iter()
         .find(|element| element.start > line.len() && element.has(Role::Retraction))
-        .is_some_and(|back| {
-            view.names
-                .all()
-                .any(|name| name.start > back.start && names_other(name))
+        .is_some_and(|retraction| {
+            view.names.all().any(|name| {
+                name.start > retraction.start
+                    && name.choice != Some(index)
+                    && name.delimiting > Delimiting::Loose
+                    && name.is_affirmed()
+            })
         });
-    Some(if differs || taken_back {
+    Some(if differs || is_retracted {
         Answer::Unparsed(UnreadReason::Ambiguous)
     } else {
         Answer::Chosen(index)
     })
+}
+
+/// The choice that the strict parsing finds in a line.
+fn strict_choice(view: &ReplyView<'_>, line: &str) -> Option<usize> {
+    match strict::read(line.trim(), &view.offered.texts) {
+        Some(Answer::Chosen(index)) => Some(index),
+        _ => None,
+    }
 }

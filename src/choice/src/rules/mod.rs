@@ -1,4 +1,4 @@
-//! Rules of reading: the strict parsing, and the steps of the lenient one.
+//! Parsing rules: the strict parsing, and the levels of the lenient parsing.
 
 mod contradiction;
 mod first_line;

@@ -1,9 +1,9 @@
-//! Answers that are announced: "the answer is B", "Answer: kitchen", "I'd go with (B)", "B is correct".
+//! [`stated`]: announced answers, as "the answer is B", "Answer: kitchen", "I'd go with (B)", "B is correct".
 
 use super::lenient;
-use crate::letters::{AFTER_A, AFTER_I, abbreviated, called_letter, hyphenated};
+use crate::letters::{AFTER_A, AFTER_I, is_abbreviated, is_called_letter, is_hyphenated};
 use crate::markers::{self, Lead, Marker, MarkerKind};
-use crate::names::{Delimiting, Name, NameState, continues_word, index_of};
+use crate::names::{Delimiting, Name, NameState, continues_word, index_of_letter};
 use crate::text::fold;
 use crate::text::words::Role;
 use crate::view::ReplyView;
@@ -20,14 +20,13 @@ struct Announcement {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Statement {
-    /// This is the answer, or the text in its place cannot be read.
+    /// The answer, or the reason why the text in its place cannot be parsed.
     Is(Answer),
-    /// This choice is not the answer.
+    /// The choice is not the answer.
     IsNot(usize),
 }
 
-/// The answer that a text announces: the last one that is stated to be the answer, else the only one that is chosen, else
-/// the only one that is mentioned.
+/// The answer that a text announces: the last statement of the answer, otherwise the only decision, otherwise the only mention.
 pub(super) fn stated(view: &ReplyView<'_>) -> Option<Answer> {
     let mut found: Vec<Marker> = markers::markers(view.folded)
         .chain(leftovers(view))
@@ -49,19 +48,24 @@ pub(super) fn stated(view: &ReplyView<'_>) -> Option<Answer> {
         }
     }
     announcements.sort_by_key(|announcement| announcement.at);
-    let of = |kind: MarkerKind| -> Vec<Announcement> {
+    let [answers, decisions, mentions] = [
+        MarkerKind::Answer,
+        MarkerKind::Decision,
+        MarkerKind::Mention,
+    ]
+    .map(|kind| {
         announcements
             .iter()
             .filter(|announcement| announcement.kind == kind)
             .copied()
-            .collect()
-    };
-    last(view, &of(MarkerKind::Answer))
-        .or_else(|| only(&of(MarkerKind::Decision), None))
-        .or_else(|| only(&of(MarkerKind::Mention), Some(view)))
+            .collect::<Vec<_>>()
+    });
+    last_answer(view, &answers)
+        .or_else(|| only_choice(&decisions, None))
+        .or_else(|| only_choice(&mentions, Some(view)))
 }
 
-/// The markers of a remainder, if a choice was denied before: "A and C are out, which leaves B".
+/// Markers such as "which leaves", after a choice was denied: "A and C are out, which leaves B".
 fn leftovers<'a>(view: &'a ReplyView<'_>) -> impl Iterator<Item = Marker> + 'a {
     let first = view
         .names
@@ -81,24 +85,25 @@ fn leftovers<'a>(view: &'a ReplyView<'_>) -> impl Iterator<Item = Marker> + 'a {
         })
 }
 
-/// The last answer that is stated, unless it is denied later.
-fn last(view: &ReplyView<'_>, announcements: &[Announcement]) -> Option<Answer> {
-    let readable = |answer: Answer| {
-        !matches!(
-            answer,
-            Answer::Unparsed(UnreadReason::NoChoice | UnreadReason::Refused)
-        )
-    };
-    let answer_of = |announcement: &Announcement| match announcement.statement {
-        Statement::Is(answer) => Some((announcement.at, answer)),
-        Statement::IsNot(_) => None,
-    };
-    let (at, answer) = announcements
-        .iter()
-        .rev()
-        .filter_map(answer_of)
-        .find(|(_, answer)| readable(*answer))
-        .or_else(|| announcements.iter().rev().find_map(answer_of))?;
+/// The last answer that is stated, unless it is denied later. Answers that could not be read are ignored if others could be read.
+fn last_answer(view: &ReplyView<'_>, announcements: &[Announcement]) -> Option<Answer> {
+    let mut answers =
+        announcements
+            .iter()
+            .rev()
+            .filter_map(|announcement| match announcement.statement {
+                Statement::Is(answer) => Some((announcement.at, answer)),
+                Statement::IsNot(_) => None,
+            });
+    let last = answers.clone().next();
+    let (at, answer) = answers
+        .find(|(_, answer)| {
+            !matches!(
+                answer,
+                Answer::Unparsed(UnreadReason::NoChoice | UnreadReason::Refused)
+            )
+        })
+        .or(last)?;
     let Answer::Chosen(chosen) = answer else {
         return Some(answer);
     };
@@ -115,8 +120,9 @@ fn last(view: &ReplyView<'_>, announcements: &[Announcement]) -> Option<Answer> 
     )
 }
 
-/// The only choice that is announced; if a view is given, no other one may be named in it by a letter, or said by a text.
-fn only(announcements: &[Announcement], view: Option<&ReplyView<'_>>) -> Option<Answer> {
+/// The only choice that is announced. With a view, another choice in the reply, named by a letter or affirmed by its text, makes the
+/// answer ambiguous.
+fn only_choice(announcements: &[Announcement], view: Option<&ReplyView<'_>>) -> Option<Answer> {
     let mut chosen = None;
     for announcement in announcements {
         match announcement.statement {
@@ -140,43 +146,42 @@ fn only(announcements: &[Announcement], view: Option<&ReplyView<'_>>) -> Option<
             Statement::Is(_) => {}
         }
     }
-    let other = |name: &&Name| name.choice != Some(chosen);
-    let named = view.is_some_and(|view| {
+    let names_other = view.is_some_and(|view| {
         view.names
             .letters
             .iter()
             .filter(|name| name.state.counts())
-            .any(|name| other(&name))
-            || view.affirmed_texts().any(|name| other(&name))
+            .chain(view.affirmed_texts())
+            .any(|name| name.choice != Some(chosen))
     });
-    Some(if named {
+    Some(if names_other {
         Answer::Unparsed(UnreadReason::Ambiguous)
     } else {
         Answer::Chosen(chosen)
     })
 }
 
-/// The announcement of a marker; `end` is the byte at which the next answer is announced.
+/// The announcement after a marker; `end` is the byte at which the next answer is announced.
 fn announcement(view: &ReplyView<'_>, marker: Marker, end: usize) -> Option<Announcement> {
     let lead = markers::lead(&view.clauses, marker.end);
     let kind = match marker.kind {
-        MarkerKind::Answer if !lead.linked => MarkerKind::Mention,
+        MarkerKind::Answer if !lead.is_linked => MarkerKind::Mention,
         MarkerKind::Remainder => MarkerKind::Answer,
         kind => kind,
     };
-    let statement = match announced(view, &lead) {
+    let statement = match announced_name(view, &lead) {
         Some((name, answer)) => match view.state(name.start) {
             NameState::Affirmed => Statement::Is(answer),
             NameState::Denied => Statement::IsNot(name.choice?),
             NameState::Excluded
-            | NameState::OfImage
+            | NameState::ImageColor
             | NameState::Conditional
             | NameState::Questioned
             | NameState::Repeated => {
                 return None;
             }
         },
-        None if lead.colon && kind == MarkerKind::Answer => {
+        None if lead.has_colon && kind == MarkerKind::Answer => {
             let rest = view.text.get(*lead.steps.last()?..end)?.trim();
             Statement::Is(read_rest(view, rest)?)
         }
@@ -189,7 +194,7 @@ fn announcement(view: &ReplyView<'_>, marker: Marker, end: usize) -> Option<Anno
     })
 }
 
-/// The answer after "Answer:" if more than a name follows: from the rest of the line, else from all the rest.
+/// The answer after "Answer:" if more than a name follows: from the rest of the line, otherwise from the rest of the text.
 fn read_rest(view: &ReplyView<'_>, rest: &str) -> Option<Answer> {
     if rest.is_empty() {
         return None;
@@ -203,8 +208,8 @@ fn read_rest(view: &ReplyView<'_>, rest: &str) -> Option<Answer> {
     })
 }
 
-/// The name that a marker leads to, and the answer that it gives in its context.
-fn announced(view: &ReplyView<'_>, lead: &Lead) -> Option<(Name, Answer)> {
+/// The name after a marker, and the answer that it gives in its context.
+fn announced_name(view: &ReplyView<'_>, lead: &Lead) -> Option<(Name, Answer)> {
     let last_step = *lead.steps.last()?;
     let name = view
         .names
@@ -231,7 +236,7 @@ fn announced(view: &ReplyView<'_>, lead: &Lead) -> Option<(Name, Answer)> {
             .is_some_and(|text| text.choice != Some(index))
     {
         Answer::Unparsed(UnreadReason::Contradiction)
-    } else if alternative(view, &name) {
+    } else if has_alternative(view, &name) {
         Answer::Unparsed(UnreadReason::Ambiguous)
     } else {
         Answer::Chosen(index)
@@ -239,8 +244,8 @@ fn announced(view: &ReplyView<'_>, lead: &Lead) -> Option<(Name, Answer)> {
     Some((name, answer))
 }
 
-/// Whether another choice follows as an alternative: "B or C", "B/C", "kitchen or bathroom".
-pub(super) fn alternative(view: &ReplyView<'_>, name: &Name) -> bool {
+/// True if another choice follows as an alternative: "B or C", "B/C", "kitchen or bathroom".
+pub(super) fn has_alternative(view: &ReplyView<'_>, name: &Name) -> bool {
     let clauses = &view.clauses;
     let mut at = clauses.index(name.end);
     while clauses.is_sign(at, &[')', ']', '.']) {
@@ -285,15 +290,15 @@ fn letter_at(view: &ReplyView<'_>, at: usize) -> Option<Name> {
     let name = Name {
         start,
         end: start + 1,
-        choice: index_of(letter).filter(|index| *index < view.offered.texts.len()),
+        choice: index_of_letter(letter).filter(|index| *index < view.offered.texts.len()),
         delimiting: Delimiting::Firm,
         state: NameState::Affirmed,
     };
     let after = right.chars().next();
     if continues_word(after)
-        || hyphenated(left, right)
-        || abbreviated(left, right)
-        || (after == Some('\'') && !turkish_copula(right))
+        || is_hyphenated(left, right)
+        || is_abbreviated(left, right)
+        || (after == Some('\'') && !has_turkish_copula(right))
     {
         return None;
     }
@@ -302,7 +307,7 @@ fn letter_at(view: &ReplyView<'_>, at: usize) -> Option<Name> {
         || words.is_empty()
         || words.starts_with(['(', '-', '–', '—', '\n']);
     let fits = match letter {
-        _ if open || ends || (letter.is_ascii_uppercase() && called_letter(left)) => true,
+        _ if open || ends || (letter.is_ascii_uppercase() && is_called_letter(left)) => true,
         'A' | 'a' => AFTER_A.is_match(words),
         'I' | 'i' => AFTER_I.is_match(words),
         'a'..='z' => AFTER_A.is_match(words) || view.names.labelled_text(&name).is_some(),
@@ -311,14 +316,14 @@ fn letter_at(view: &ReplyView<'_>, at: usize) -> Option<Name> {
     fits.then_some(name)
 }
 
-/// "B'dir", "C'tir": Turkish "is", joined by an apostrophe.
-fn turkish_copula(right: &str) -> bool {
+/// True if a Turkish "is" follows, joined by an apostrophe: "B'dir", "C'tir".
+fn has_turkish_copula(right: &str) -> bool {
     ["'dir", "'dır", "'dur", "'dür", "'tir", "'tır"]
         .iter()
         .any(|end| right.starts_with(end))
 }
 
-/// Names that the text after them calls the answer: "B is the correct answer", "only B remains".
+/// Announcements of names that are confirmed by the text after them: "B is the correct answer", "only B remains".
 fn confirmed<'a>(view: &'a ReplyView<'_>) -> impl Iterator<Item = Announcement> + 'a {
     let letters =
         view.names.letters.iter().filter(|name| {
@@ -342,10 +347,10 @@ fn confirmed<'a>(view: &'a ReplyView<'_>) -> impl Iterator<Item = Announcement> 
         })
 }
 
-/// Number of elements between "only" and a name: "only option B".
+/// Maximum number of elements from "only" to a name: "only option B".
 const ONLY_WITHIN: usize = 3;
 
-/// Whether a name is called the only one that is left: "only B remains"; behind an excluded name, "B remains".
+/// True if a name is stated to be the only one that remains: "only B remains", or "B remains" after an excluded name.
 fn remains(view: &ReplyView<'_>, name: &Name) -> bool {
     let elements = &view.clauses.elements;
     let mut behind = view.clauses.index(name.end);

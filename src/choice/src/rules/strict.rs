@@ -1,16 +1,16 @@
 //! The strict parsing: a choice's text, its letter, or its letter with its text.
 
-use crate::names::index_of;
+use crate::names::index_of_letter;
 use darkqa_ground::types::questions::{Answer, UnreadReason};
 
-/// The answer of a reply that is exactly one of the strict forms; otherwise `None`.
+/// Parses a reply that is exactly one of the strict forms; `None` for any other reply.
 ///
 /// The forms, in upper or lower case, are: a choice's text with or without a final period; `B`, `(B)`, `[B]`, `B.`, `B)`,
 /// `B:`, `（B）`, `B．`, `B：`, `B、`; and such a letter, or `B -`, before the text of the same choice.
 pub(crate) fn read(text: &str, choices: &[String]) -> Option<Answer> {
     let by_text = position(text, choices);
     let by_letter = label(text).and_then(|(letter, rest)| {
-        let index = index_of(letter).filter(|index| *index < choices.len());
+        let index = index_of_letter(letter).filter(|index| *index < choices.len());
         let named = position(rest, choices);
         match (index, named) {
             _ if !rest.is_empty() && named.is_none() => None,
@@ -41,13 +41,19 @@ fn position(text: &str, choices: &[String]) -> Option<usize> {
         return None;
     }
     let folded = text.to_lowercase();
-    let same = |choice: &String| choice.trim().to_lowercase() == folded;
-    let nearly = |choice: &String| bare(&choice.trim().to_lowercase()) == bare(&folded);
-    let exact = choices.iter().position(same);
-    exact.or_else(|| choices.iter().position(nearly))
+    let choices: Vec<String> = choices
+        .iter()
+        .map(|choice| choice.trim().to_lowercase())
+        .collect();
+    let exact = choices.iter().position(|choice| *choice == folded);
+    exact.or_else(|| {
+        choices
+            .iter()
+            .position(|choice| bare(choice) == bare(&folded))
+    })
 }
 
-/// The letter with which a reply begins as a label, and the text after it, which may be empty.
+/// The letter that a reply begins with as a label, and the text after it, which may be empty.
 fn label(text: &str) -> Option<(char, &str)> {
     let text = text.trim();
     let mut chars = text.chars();

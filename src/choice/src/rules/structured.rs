@@ -39,7 +39,7 @@ const KEYS: [&str; 24] = [
     "回答",
 ];
 
-/// JSON keys that hold the answer inside the object of an answer key.
+/// JSON keys of the answer inside an object that is the value of an answer key.
 const INNER_KEYS: [&str; 5] = ["text", "label", "value", "name", "id"];
 
 static TAGGED: LazyLock<Regex> = LazyLock::new(|| {
@@ -49,11 +49,11 @@ static TAGGED: LazyLock<Regex> = LazyLock::new(|| {
     ))
 });
 
-/// Maximum length of a LaTeX box that is read, in bytes. An answer is shorter.
+/// Maximum length of a LaTeX box, in bytes. An answer is shorter.
 const BOX_BYTES: usize = 2000;
 
-/// The answer under an answer key in the JSON objects of a text. An object with such a key decides, even if its value cannot
-/// be read.
+/// The answer under an answer key in the JSON objects of a text. If any object has such a key, later levels are not tried, even if its
+/// value cannot be parsed.
 pub(super) fn json(tidy: &str, choices: &ChoiceViews) -> Option<Answer> {
     let mut answers = Vec::new();
     let mut from = 0;
@@ -64,7 +64,7 @@ pub(super) fn json(tidy: &str, choices: &ChoiceViews) -> Option<Answer> {
         from = match values.next() {
             Some(Ok(value)) => {
                 for (key, value) in value.as_object().into_iter().flatten() {
-                    if KEYS.contains(&key_form(key).as_str()) {
+                    if KEYS.contains(&normalize_key(key).as_str()) {
                         answers.push(value_answer(value, choices));
                     }
                 }
@@ -73,17 +73,18 @@ pub(super) fn json(tidy: &str, choices: &ChoiceViews) -> Option<Answer> {
             _ => start + 1,
         };
     }
-    agreed(&answers)
+    common_answer(&answers)
 }
 
-fn key_form(key: &str) -> String {
+/// A key in lower case without spaces and punctuation.
+fn normalize_key(key: &str) -> String {
     key.chars()
         .filter(|c| c.is_alphanumeric())
         .flat_map(char::to_lowercase)
         .collect()
 }
 
-/// The answer in a JSON value. A number is read as a choice's text, never as its position.
+/// The answer in a JSON value. A number is parsed as a choice's text, never as its index.
 fn value_answer(value: &Value, choices: &ChoiceViews) -> Answer {
     let unread = Answer::Unparsed(UnreadReason::NoChoice);
     match value {
@@ -94,18 +95,18 @@ fn value_answer(value: &Value, choices: &ChoiceViews) -> Answer {
                 .iter()
                 .map(|value| value_answer(value, choices))
                 .collect();
-            agreed(&answers).unwrap_or(unread)
+            common_answer(&answers).unwrap_or(unread)
         }
         Value::Object(fields) => {
             let answers: Vec<Answer> = fields
                 .iter()
                 .filter(|(key, _)| {
-                    let key = key_form(key);
+                    let key = normalize_key(key);
                     KEYS.contains(&key.as_str()) || INNER_KEYS.contains(&key.as_str())
                 })
                 .map(|(_, value)| value_answer(value, choices))
                 .collect();
-            agreed(&answers).unwrap_or(unread)
+            common_answer(&answers).unwrap_or(unread)
         }
         Value::Null | Value::Bool(_) => unread,
     }
@@ -117,11 +118,12 @@ pub(super) fn boxed(tidy: &str, choices: &ChoiceViews) -> Option<Answer> {
         .captures_iter(tidy)
         .filter_map(|found| found.get(1))
         .map(|inner| inner.as_str());
-    let inner = boxes(tidy)
+    let answers: Vec<Answer> = boxes(tidy)
         .chain(tagged)
-        .filter(|inner| !inner.trim().is_empty());
-    let answers: Vec<Answer> = inner.map(|inner| text_answer(inner, choices)).collect();
-    agreed(&answers)
+        .filter(|inner| !inner.trim().is_empty())
+        .map(|inner| text_answer(inner, choices))
+        .collect();
+    common_answer(&answers)
 }
 
 /// Contents of LaTeX boxes, up to the closing brace of each.
@@ -151,8 +153,8 @@ fn text_answer(text: &str, choices: &ChoiceViews) -> Answer {
     lenient::read_part(text, choices)
 }
 
-/// The choice on which all answers agree. Answers that could not be read are ignored if there are others.
-fn agreed(answers: &[Answer]) -> Option<Answer> {
+/// The answer on which all answers agree. Answers that could not be read are ignored if others could be read.
+fn common_answer(answers: &[Answer]) -> Option<Answer> {
     let mut readable = answers.iter().filter(|answer| {
         !matches!(
             answer,

@@ -8,11 +8,11 @@ use regex::Regex;
 use crate::text::clean::compiled;
 use darkqa_ground::types::questions::{Answer, UnreadReason};
 
-/// One mark: yes, or no.
+/// A mark for yes or no.
 static MARK: LazyLock<Regex> =
     LazyLock::new(|| compiled(r"(?P<yes>[✓✔✅☑👍]|\[[xX]\])|(?P<no>[✗✘❌❎✖👎☐]|\[ \])"));
 
-/// A mark that may mean yes or no.
+/// A mark that may mean either yes or no.
 const UNKNOWN: char = '☒';
 
 /// Meaning of a mark for the item next to it.
@@ -27,54 +27,55 @@ enum Mark {
 pub(super) struct Ticks {
     ticked: Vec<usize>,
     crossed: Vec<usize>,
-    /// Whether there are more than [`MAX_MARKS`].
-    is_endless: bool,
+    /// True if the text contains more than [`MAX_MARKS`] marks.
+    has_too_many: bool,
 }
 
 /// Maximum number of marks that are parsed. A reply with more repeats itself and is not evaluated.
 const MAX_MARKS: usize = 100;
 
 impl Ticks {
-    /// The answer of the marks: the only choice that is ticked. If there are only crosses, `stated` is, if it is not crossed;
-    /// a tick and another stated answer contradict each other. `None` if no item names a choice.
+    /// The only choice that is ticked. Without ticks, `stated` if it is not crossed. Several ticks, or a tick and another stated answer,
+    /// are ambiguous. `None` if no item with a mark names a choice.
     pub(super) fn answer(&self, stated: Option<Answer>) -> Option<Answer> {
         let stated = stated.filter(|answer| matches!(answer, Answer::Chosen(_)));
-        let unparsed = |reason| Some(Answer::Unparsed(reason));
+        let ambiguous = Some(Answer::Unparsed(UnreadReason::Ambiguous));
         match (self.ticked.first(), stated) {
-            _ if self.is_endless => unparsed(UnreadReason::Ambiguous),
+            _ if self.has_too_many => ambiguous,
             (None, _) if self.crossed.is_empty() => None,
             (None, Some(Answer::Chosen(index))) if !self.crossed.contains(&index) => stated,
-            (None, _) => unparsed(UnreadReason::Negated),
-            (Some(first), _) if self.ticked.iter().any(|other| other != first) => {
-                unparsed(UnreadReason::Ambiguous)
-            }
-            (Some(first), _) if self.crossed.contains(first) => unparsed(UnreadReason::Ambiguous),
-            (Some(first), Some(answer)) if answer != Answer::Chosen(*first) => {
-                unparsed(UnreadReason::Ambiguous)
-            }
+            (None, _) => Some(Answer::Unparsed(UnreadReason::Negated)),
+            (Some(first), _) if self.ticked.iter().any(|other| other != first) => ambiguous,
+            (Some(first), _) if self.crossed.contains(first) => ambiguous,
+            (Some(first), Some(answer)) if answer != Answer::Chosen(*first) => ambiguous,
             (Some(first), _) => Some(Answer::Chosen(*first)),
         }
     }
 }
 
-/// The text without the lines that have a mark of unknown meaning.
+/// Removes the lines with a mark of unknown meaning.
 pub(super) fn without_unknown(tidy: &str) -> Cow<'_, str> {
     if !tidy.contains(UNKNOWN) {
         return Cow::Borrowed(tidy);
     }
-    let lines = tidy.lines().filter(|line| !line.contains(UNKNOWN));
-    Cow::Owned(lines.collect::<Vec<_>>().join("\n"))
+    let lines: Vec<&str> = tidy
+        .lines()
+        .filter(|line| !line.contains(UNKNOWN))
+        .collect();
+    Cow::Owned(lines.join("\n"))
 }
 
-/// The marks of a text, with the choice that `read` finds in the item of each. A line with one mark is an item; a line with
-/// more has an item at each mark, behind it if the line begins with a mark, otherwise before it.
+/// The ticked and crossed choices of a text; `read` parses an item. `None` without marks.
+///
+/// A line with one mark is one item. In a line with several marks, the items follow the marks if the line begins with a mark, otherwise
+/// they precede the marks.
 pub(super) fn ticked(tidy: &str, read: impl Fn(&str) -> Answer) -> Option<Ticks> {
     if !MARK.is_match(tidy) {
         return None;
     }
     let mut ticks = Ticks::default();
     if MARK.find_iter(tidy).nth(MAX_MARKS).is_some() {
-        ticks.is_endless = true;
+        ticks.has_too_many = true;
         return Some(ticks);
     }
     for line in tidy.lines() {
@@ -106,17 +107,13 @@ fn items(line: &str) -> Vec<(Mark, &str)> {
             Some((mark, whole.start(), whole.end()))
         })
         .collect();
-    let blank = |text: &str| {
-        text.trim_matches([' ', '\t', '|', '-', '*', '+', '•'])
-            .is_empty()
-    };
     let leads = marks
         .first()
-        .is_some_and(|(_, start, _)| blank(&line[..*start]));
+        .is_some_and(|(_, start, _)| is_blank(&line[..*start]));
     if let [(mark, start, end)] = *marks {
         let item = if leads {
             &line[end..]
-        } else if blank(&line[end..]) {
+        } else if is_blank(&line[end..]) {
             &line[..start]
         } else {
             line
@@ -133,4 +130,10 @@ fn items(line: &str) -> Vec<(Mark, &str)> {
         items.push((*mark, item));
     }
     items
+}
+
+/// True if a text contains only spaces, bullets and table rules.
+fn is_blank(text: &str) -> bool {
+    text.trim_matches([' ', '\t', '|', '-', '*', '+', '•'])
+        .is_empty()
 }

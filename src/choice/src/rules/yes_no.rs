@@ -1,11 +1,11 @@
-//! A leading "yes" or "no": [`yes_or_no`].
+//! [`yes_or_no`]: a leading "yes" or "no".
 
 use crate::names::Delimiting;
 use crate::view::ReplyView;
 use darkqa_ground::types::questions::{Answer, UnreadReason};
 
-/// The leading word, if yes and no are among the choices: "Yes, there is no lamp". A leading "no" counts only if it is an
-/// answer and not a determiner; the other word must not be said as well.
+/// The first word, if yes and no are among the choices: "Yes, there is no lamp". A "no" counts only if it is an answer and not a
+/// determiner; if the other word is named too, the reply is ambiguous.
 pub(super) fn yes_or_no(view: &ReplyView<'_>) -> Option<Answer> {
     let (yes, no) = view.offered.yes_no?;
     let first = view

@@ -3,8 +3,8 @@
 use crate::text::words::Role;
 use crate::text::{Boundary, Clauses, Element, Ranges};
 
-/// The conditions with their main clauses, and what precedes "would need" and its like. A condition that only makes the model
-/// choose ("if I had to guess") is none.
+/// Ranges of conditions with their main clauses, and of the words before phrases such as "would need". A condition that only forces a
+/// choice ("if I had to guess") is not included.
 pub(crate) fn conditional(clauses: &Clauses<'_>) -> Ranges {
     let mut ranges = Vec::new();
     let (mut first, mut unmet) = (0, false);
@@ -12,45 +12,50 @@ pub(crate) fn conditional(clauses: &Clauses<'_>) -> Ranges {
     for (at, element) in elements.iter().enumerate() {
         // A comma ends neither the condition nor its main clause, and a colon may stand between them.
         let is_colon = clauses.is_sign(at, &[':', '：']);
-        if element.boundary == Boundary::Sentence || (element.cuts() && !is_colon) {
-            let found = within(clauses, first..at, unmet && goes_on(clauses, first));
+        if element.boundary == Boundary::Sentence || (element.ends_clause() && !is_colon) {
+            let found = conditional_ranges(
+                clauses,
+                first..at,
+                unmet && continues_condition(clauses, first),
+            );
             unmet = !found.is_empty();
             ranges.extend(found);
             first = at + 1;
         }
     }
-    let last = unmet && goes_on(clauses, first);
-    ranges.extend(within(clauses, first..elements.len(), last));
+    let last = unmet && continues_condition(clauses, first);
+    ranges.extend(conditional_ranges(clauses, first..elements.len(), last));
     Ranges::new(ranges)
 }
 
-/// Whether a clause goes on with the condition before it: "Suppose there is a stove; then it is a kitchen."
-fn goes_on(clauses: &Clauses<'_>, first: usize) -> bool {
-    let element = clauses.elements.get(first);
-    element.is_some_and(|element| element.slice(clauses.folded) == "then")
+/// True if a clause continues the condition before it: "Suppose there is a stove; then it is a kitchen."
+fn continues_condition(clauses: &Clauses<'_>, first: usize) -> bool {
+    clauses
+        .elements
+        .get(first)
+        .is_some_and(|element| element.slice(clauses.folded) == "then")
 }
 
-/// Words that speak of light.
-const LIGHT: [Role; 3] = [Role::Given, Role::Better, Role::LightNoun];
+/// The roles of a phrase about more light, such as "with better lighting".
+const MORE_LIGHT: [Role; 3] = [Role::Given, Role::Better, Role::LightNoun];
 
-/// The stretches in one condition with its main clause, from their elements; all of it, if it `goes_on` with one.
-fn within(
+/// The conditional ranges in the clauses with these elements; all of them if they continue an earlier condition.
+fn conditional_ranges(
     clauses: &Clauses<'_>,
     all: std::ops::Range<usize>,
-    goes_on: bool,
+    continues: bool,
 ) -> Vec<(usize, usize)> {
     let elements = &clauses.elements[all];
     let (Some(first), Some(last)) = (elements.first(), elements.last()) else {
         return Vec::new();
     };
-    let has = |role: Role| elements.iter().any(|element| element.has(role));
     let head = elements
         .iter()
         .find(|element| !element.has(Role::And) && !element.has(Role::Adverb))
         .unwrap_or(first);
     // "Were it brighter, I would …", "I would …, were it brighter".
     let inverted = head.has(Role::Inverted)
-        || (has(Role::ModalPast)
+        || (any_has(elements, Role::ModalPast)
             && elements
                 .iter()
                 .zip(&elements[1..])
@@ -58,13 +63,21 @@ fn within(
                     before.boundary > Boundary::None && element.has(Role::Inverted)
                 }));
     // "With more light".
-    let in_light = elements
-        .windows(LIGHT.len())
-        .any(|words| words.iter().zip(LIGHT).all(|(word, role)| word.has(role)));
-    if goes_on || in_light || has(Role::Condition) || inverted || is_unmet(elements, head) {
+    let in_light = elements.windows(MORE_LIGHT.len()).any(|words| {
+        words
+            .iter()
+            .zip(MORE_LIGHT)
+            .all(|(word, role)| word.has(role))
+    });
+    if continues
+        || in_light
+        || any_has(elements, Role::Condition)
+        || inverted
+        || is_unmet(elements, head)
+    {
         return vec![(first.start, last.end)];
     }
-    let forced = has(Role::Forced);
+    let forced = any_has(elements, Role::Forced);
     let mut ranges = Vec::new();
     let (mut part, mut expects) = (first.start, None);
     for element in elements {
@@ -72,7 +85,7 @@ fn within(
             ranges.extend(expects.take().map(|start| (start, element.start)));
             part = element.end;
         }
-        // "A bedroom would have a bed"; the left part of "… if that is a stove" is unsure, its right part is asked.
+        // In "a bedroom would have a bed" and "a kitchen if that is a stove", the whole part of the clause is uncertain.
         if element.has(Role::Expected) || (element.has(Role::If) && !forced) {
             expects = Some(part);
         }
@@ -81,8 +94,13 @@ fn within(
     ranges
 }
 
-/// True if the elements have an "if" that makes all of them uncertain: it begins them, or they are counterfactual.
+/// True if an "if" makes all elements uncertain, because they begin with it or are counterfactual.
 fn is_unmet(elements: &[Element], head: &Element) -> bool {
-    let has = |role: Role| elements.iter().any(|element| element.has(role));
-    has(Role::If) && !has(Role::Forced) && (head.has(Role::If) || has(Role::ModalPast))
+    any_has(elements, Role::If)
+        && !any_has(elements, Role::Forced)
+        && (head.has(Role::If) || any_has(elements, Role::ModalPast))
+}
+
+fn any_has(elements: &[Element], role: Role) -> bool {
+    elements.iter().any(|element| element.has(role))
 }

@@ -1,39 +1,45 @@
-//! Stretches of a text in which names are denied, and stay in the way of other names: [`denied`].
+//! [`denied`]: ranges of a text in which choices are denied. A denied choice makes another choice ambiguous ("not A but C").
 
-use crate::named::Names;
+use crate::name_index::Names;
 use crate::text::words::Role;
 use crate::text::{Boundary, Clauses, Ranges};
 
-/// The names that "not" and its like deny: those behind it in its part of a clause, and the one directly before it.
+/// Ranges of the names that words such as "not" deny: after the word in its part of the clause, and directly before it.
 pub(crate) fn denied(clauses: &Clauses<'_>, names: &Names<'_>) -> Ranges {
-    Ranges::new([before(clauses), behind(clauses, names)].concat())
+    Ranges::new(
+        [
+            scopes_after_not(clauses),
+            subjects_before_not(clauses, names),
+        ]
+        .concat(),
+    )
 }
 
-/// Number of elements in which "no lamp, sofa, or table" is recognized behind a comma.
+/// Maximum number of elements after the first comma of a list such as "no lamp, sofa, or table".
 const LIST_WITHIN: usize = 24;
 
-/// Number of elements of an item of such a list.
+/// Maximum number of elements of an item in such a list.
 const ITEM_WORDS: usize = 3;
 
-/// The reach of "not" and its like: to the end of the clause's part. A comma directly behind "not" does not end it ("it is
-/// not, I think, a kitchen"), nor one in a list that ends with "or".
-fn before(clauses: &Clauses<'_>) -> Vec<(usize, usize)> {
+/// Scopes of words such as "not", to the end of the part of the clause. A comma directly after "not" does not end the scope ("it is not, I
+/// think, a kitchen"), nor does a comma in a list that ends with "or".
+fn scopes_after_not(clauses: &Clauses<'_>) -> Vec<(usize, usize)> {
     let elements = &clauses.elements;
     let mut ranges = Vec::new();
     let mut open: Option<usize> = None;
-    // Index of the element up to which no part of the clause ends the reach.
+    // Before this element, the end of a part of the clause does not end the scope.
     let mut until = 0;
     for (at, element) in elements.iter().enumerate() {
         if let Some(start) = open
             && element.boundary > Boundary::None
         {
             if at >= until && at > 0 {
-                until = passed(clauses, at).unwrap_or(0);
+                until = skip_insertion(clauses, at).unwrap_or(0);
             }
             // "Not the answer: B".
             let heading =
                 at > 0 && clauses.is_sign(at, &[':']) && elements[at - 1].has(Role::Candidate);
-            if (element.cuts() || at >= until) && !heading {
+            if (element.ends_clause() || at >= until) && !heading {
                 ranges.push((start, element.start));
                 open = None;
             }
@@ -46,12 +52,12 @@ fn before(clauses: &Clauses<'_>) -> Vec<(usize, usize)> {
     ranges
 }
 
-/// Number of elements of a parenthesis between two commas.
+/// Maximum number of elements of a parenthesis between two commas.
 const PARENTHESIS_WITHIN: usize = 12;
 
-/// The index behind what a sign begins, if the reach of "not" passes it: a bracket directly behind "not", a parenthesis between
-/// two commas directly behind it, or the rest of a list.
-fn passed(clauses: &Clauses<'_>, at: usize) -> Option<usize> {
+/// The index after the insertion that a sign begins, if the scope of "not" continues after it: a bracket or a parenthesis between two
+/// commas directly after "not", or the rest of a list.
+fn skip_insertion(clauses: &Clauses<'_>, at: usize) -> Option<usize> {
     let before = clauses.elements[at - 1];
     let word = before.slice(clauses.folded);
     if clauses.is_sign(at, &['(']) {
@@ -70,11 +76,11 @@ fn passed(clauses: &Clauses<'_>, at: usize) -> Option<usize> {
                 + 1,
         );
     }
-    list(clauses, at)
+    list_end(clauses, at)
 }
 
-/// The index behind a list of short items that goes on behind a comma and ends with "or" or "nor".
-fn list(clauses: &Clauses<'_>, comma: usize) -> Option<usize> {
+/// The index after a list of short items that continues after a comma and ends with "or" or "nor".
+fn list_end(clauses: &Clauses<'_>, comma: usize) -> Option<usize> {
     let mut words = 0;
     let mut closes = false;
     for (at, element) in clauses
@@ -101,8 +107,8 @@ fn list(clauses: &Clauses<'_>, comma: usize) -> Option<usize> {
     closes.then_some(clauses.elements.len())
 }
 
-/// The names directly before "not": "B is not correct", "kitchen isn't", "B is no option", "C不是".
-fn behind(clauses: &Clauses<'_>, names: &Names<'_>) -> Vec<(usize, usize)> {
+/// Names directly before words such as "not": "B is not correct", "kitchen isn't", "B is no option", "C不是".
+fn subjects_before_not(clauses: &Clauses<'_>, names: &Names<'_>) -> Vec<(usize, usize)> {
     let elements = &clauses.elements;
     let mut ranges = Vec::new();
     for at in 1..elements.len() {
@@ -118,13 +124,13 @@ fn behind(clauses: &Clauses<'_>, names: &Names<'_>) -> Vec<(usize, usize)> {
         let subject = elements[before];
         // A lower-case letter may be a name as well: "answer c is wrong".
         let letter = (subject.start + 1 == subject.end).then_some(subject.start);
-        let start = names.start_of(subject.end).or(letter);
+        let start = names.start_of_name_ending_at(subject.end).or(letter);
         ranges.extend(start.map(|start| (start, subject.end)));
     }
     ranges
 }
 
-/// Index of the element before a denial of the subject and its verb; `None` if an element is none.
+/// Index of the last element of the subject that the element at `at` denies; `None` if the element denies no subject.
 fn subject_end(clauses: &Clauses<'_>, at: usize) -> Option<usize> {
     let elements = &clauses.elements;
     let element = &elements[at];
@@ -136,9 +142,8 @@ fn subject_end(clauses: &Clauses<'_>, at: usize) -> Option<usize> {
         return Some(before);
     }
     if element.has(Role::Absent) {
-        let verb = clauses.verb_before(at).filter(|verb| *verb > 0);
-        let verb = verb.filter(|verb| elements[*verb].has(Role::Copula));
-        if let Some(verb) = verb {
+        let verb = clauses.verb_before(at);
+        if let Some(verb) = verb.filter(|verb| *verb > 0 && elements[*verb].has(Role::Copula)) {
             return Some(verb - 1);
         }
     }

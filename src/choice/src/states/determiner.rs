@@ -1,14 +1,14 @@
-//! The word "no": an answer, or a determiner ("no light reaches the sensor"): [`answers`].
+//! The word "no" as an answer or as a determiner ("no light reaches the sensor"): [`is_answer`].
 
 use crate::text::words::{Role, phrase_at};
 use crate::text::{Token, TokenKind, tokens};
 
-/// Number of bytes behind "no" that are looked at.
+/// Number of bytes that are examined after the start of "no".
 const LOOK_AHEAD: usize = 64;
 
-/// Whether the "no" at `start..end` can be an answer: behind it stands the end, a line break, a punctuation mark, or, at the
-/// beginning of a clause, a clause of its own ("No there is none"); and it is no idiom ("no doubt").
-pub(crate) fn answers(folded: &str, start: usize, end: usize) -> bool {
+/// True if the "no" at `start..end` can be an answer: it is followed by the end, a line break, a punctuation mark or, at the beginning of
+/// a clause, another clause ("No there is none"); and it is not part of an idiom ("no doubt").
+pub(crate) fn is_answer(folded: &str, start: usize, end: usize) -> bool {
     let to = folded.floor_char_boundary(end + LOOK_AHEAD);
     let around = &folded[start..to];
     let words = tokens(around);
@@ -35,7 +35,7 @@ pub(crate) fn answers(folded: &str, start: usize, end: usize) -> bool {
     })
 }
 
-/// Whether a sign ends the word before it.
+/// True if a sign ends the word before it.
 fn ends_word(text: &str, sign: &Token) -> bool {
     sign.is_sign(
         text,

@@ -1,12 +1,12 @@
-//! Stretches of a text in which names are taken out of the running: [`excluded`].
+//! [`excluded`]: ranges of a text in which choices are ruled out.
 
-use super::reach::ends;
-use crate::named::Names;
+use super::scope::ends_scope;
+use crate::name_index::Names;
 use crate::text::words::Role;
 use crate::text::{Boundary, Clauses, Element, Ranges};
 
-/// The names that "rule out" and its like exclude: those behind it in its clause; and before "can be ruled out" and its like,
-/// those of its clause.
+/// Ranges that phrases such as "rule out" exclude (the rest of the clause) and phrases such as "can be ruled out" (the clause before
+/// them).
 pub(crate) fn excluded(clauses: &Clauses<'_>, names: &Names<'_>) -> Ranges {
     let mut exclusions = Exclusions {
         clauses,
@@ -18,21 +18,21 @@ pub(crate) fn excluded(clauses: &Clauses<'_>, names: &Names<'_>) -> Ranges {
         ranges: Vec::new(),
     };
     for (at, element) in clauses.elements.iter().enumerate() {
-        if ends(clauses, names, exclusions.open, at) {
+        if ends_scope(clauses, names, exclusions.open, at) {
             exclusions.close(element.start);
         }
         exclusions.begin_clause(at, element);
-        exclusions.word(at, element);
+        exclusions.apply_word(at, element);
     }
     exclusions.close(clauses.folded.len());
     Ranges::new(exclusions.ranges)
 }
 
-/// The stretches in which names are excluded, found from left to right.
+/// A scan of a text from left to right for ranges in which names are excluded.
 struct Exclusions<'a> {
     clauses: &'a Clauses<'a>,
     names: &'a Names<'a>,
-    /// First byte of the reach of a denial that is not over.
+    /// First byte of the scope of an exclusion that has not ended yet.
     open: Option<usize>,
     /// First byte of the clause.
     clause: usize,
@@ -44,14 +44,15 @@ struct Exclusions<'a> {
 }
 
 impl Exclusions<'_> {
+    /// Ends the open scope, if any.
     fn close(&mut self, end: usize) {
         self.ranges
             .extend(self.open.take().map(|start| (start, end)));
     }
 
-    /// Follows the beginning of the clause. What stands in brackets is one of its own.
+    /// Tracks the start of the current clause. Text in brackets is a separate clause.
     fn begin_clause(&mut self, at: usize, element: &Element) {
-        if element.cuts() {
+        if element.ends_clause() {
             self.before_colon = if self.clauses.is_sign(at, &[':']) {
                 self.clause
             } else {
@@ -68,8 +69,8 @@ impl Exclusions<'_> {
         }
     }
 
-    /// Begins the reach of a denial, or excludes what stands before a predicate.
-    fn word(&mut self, at: usize, element: &Element) {
+    /// Opens a scope at an excluding word, or excludes the words before a predicate.
+    fn apply_word(&mut self, at: usize, element: &Element) {
         let next = self.clauses.elements.get(at + 1);
         // "The wrong answer is A", "Wrong: A".
         let announces = self.clauses.is_sign(at + 1, &[':'])
@@ -88,7 +89,8 @@ impl Exclusions<'_> {
         }
     }
 
-    /// First byte of what a predicate of denial excludes: "A and C can be excluded", "A: wrong".
+    /// First byte of the subject that a predicate excludes: "A and C can be excluded", "A: wrong". `None` if the element at `at` is not
+    /// such a predicate.
     fn subject(&self, at: usize) -> Option<usize> {
         let (clauses, elements) = (self.clauses, &self.clauses.elements);
         let element = &elements[at];
@@ -101,22 +103,22 @@ impl Exclusions<'_> {
         if elements[verb].has(Role::Copula) {
             let is_named = self.names.any(self.clause, element.start);
             // "It is wrong" refers to the last name.
-            let pronoun = !is_named && last && self.is_pronoun(verb);
+            let pronoun = !is_named && last && self.has_pronoun_subject(verb);
             return Some(
                 self.names
-                    .last_before(element.start)
+                    .last_start(element.start)
                     .filter(|_| pronoun)
                     .unwrap_or(self.clause),
             );
         }
-        // Without a verb, it is a predicate only directly after a name.
+        // Without a verb, the element is a predicate only directly after a name.
         let joints = [':', '-', '–', '—', '(', ',', '=', '→', ')', ']'];
         let mut name = verb;
         while name > 0 && clauses.is_sign(name, &joints) {
             name -= 1;
         }
         let end = elements[name].end;
-        self.names.start_of(end)?;
+        self.names.start_of_name_ending_at(end)?;
         Some(if self.clause < end {
             self.clause
         } else {
@@ -124,8 +126,8 @@ impl Exclusions<'_> {
         })
     }
 
-    /// Whether the clause of a verb has nothing but a pronoun before it.
-    fn is_pronoun(&self, verb: usize) -> bool {
+    /// True if the subject of a verb is only a pronoun.
+    fn has_pronoun_subject(&self, verb: usize) -> bool {
         let elements = &self.clauses.elements;
         elements[..=verb]
             .iter()

@@ -1,11 +1,11 @@
-//! Colors that a text attributes to the image, not to an object in it: [`image_colors`].
+//! [`image_colors`]: colors that a text attributes to the image and not to an object in it.
 
 use crate::choice_views::{ChoiceViews, Naming};
 use crate::names::Name;
 use crate::text::words::Role;
 use crate::text::{Boundary, Clauses, Ranges, TokenKind};
 
-/// The names of colors that describe the image: "the image is black", "gray noise", "I only see black", "completely black".
+/// Ranges of the color names that describe the image: "the image is black", "gray noise", "I only see black", "completely black".
 pub(crate) fn image_colors(clauses: &Clauses<'_>, texts: &[Name], offered: &ChoiceViews) -> Ranges {
     let described = texts
         .iter()
@@ -17,7 +17,7 @@ pub(crate) fn image_colors(clauses: &Clauses<'_>, texts: &[Name], offered: &Choi
     Ranges::new(described.map(|name| (name.start, name.end)).collect())
 }
 
-/// Number of elements around a color that are looked at.
+/// Number of elements before and after a color that are examined.
 const WITHIN: usize = 12;
 
 fn describes_image(clauses: &Clauses<'_>, name: &Name) -> bool {
@@ -31,7 +31,7 @@ fn describes_image(clauses: &Clauses<'_>, name: &Name) -> bool {
     denied || before_noise(clauses, behind) || after_subject(clauses, first, behind)
 }
 
-/// Whether a noun for what an image is made of follows, perhaps after further colors: "gray noise", "black and white image".
+/// True if a noun such as "noise" or "image" follows the color, perhaps after further colors: "gray noise", "black and white image".
 fn before_noise(clauses: &Clauses<'_>, behind: usize) -> bool {
     let elements = &clauses.elements;
     let mut at = behind;
@@ -66,7 +66,7 @@ fn before_noise(clauses: &Clauses<'_>, behind: usize) -> bool {
     false
 }
 
-/// Whether the words before a color make it the image's: its subject, or "I only see", or "completely" alone.
+/// True if the words before a color attribute it to the image: the subject of the sentence, "I only see", or "completely" alone.
 fn after_subject(clauses: &Clauses<'_>, first: usize, behind: usize) -> bool {
     let elements = &clauses.elements;
     let ends = elements
@@ -76,7 +76,7 @@ fn after_subject(clauses: &Clauses<'_>, first: usize, behind: usize) -> bool {
     for at in (first.saturating_sub(WITHIN)..first).rev() {
         let element = &elements[at];
         let word = element.slice(clauses.folded);
-        let begins = clauses.begins(at);
+        let begins = clauses.begins_part(at);
         entirely |= element.has(Role::Entirely);
         let alone = matches!(word, "only" | "just" | "nothing but");
         let sees_before = at > 0 && elements[at - 1].has(Role::See);
@@ -87,7 +87,7 @@ fn after_subject(clauses: &Clauses<'_>, first: usize, behind: usize) -> bool {
         if element.has(Role::Copula) {
             return element.has(Role::Image)
                 || (entirely && element.has(Role::Pronoun))
-                || is_image(clauses, at, entirely);
+                || has_image_subject(clauses, at, entirely);
         }
         // "Completely black.", "Picture: black."
         let heading = at > 0 && clauses.is_sign(at, &[':']) && elements[at - 1].has(Role::Image);
@@ -109,8 +109,8 @@ fn is_color(clauses: &Clauses<'_>, at: usize) -> bool {
         .has_any(&[Role::Color, Role::Shade])
 }
 
-/// Whether the subject of the verb at an element is the image, or a pronoun that `entirely` makes to mean it.
-fn is_image(clauses: &Clauses<'_>, verb: usize, entirely: bool) -> bool {
+/// True if the subject of a verb is the image, or a pronoun in a clause with a word such as "entirely".
+fn has_image_subject(clauses: &Clauses<'_>, verb: usize, entirely: bool) -> bool {
     let elements = &clauses.elements;
     let start = (verb.saturating_sub(WITHIN)..verb)
         .rev()
@@ -125,32 +125,25 @@ fn is_image(clauses: &Clauses<'_>, verb: usize, entirely: bool) -> bool {
         .any(|at| elements[at].has(Role::Image) && is_head(clauses, start, at))
 }
 
-/// Whether an image noun is the subject, not a place in it: "the sofa in the image is white", but "most of the image is black".
+/// True if an image noun is the head of the subject, as in "most of the image is black", and not a place, as in "the sofa in the image is
+/// white".
 fn is_head(clauses: &Clauses<'_>, start: usize, noun: usize) -> bool {
     let elements = &clauses.elements;
-    let article = |at: &usize| {
-        let word = elements[*at].slice(clauses.folded);
-        is_color(clauses, *at)
-            || elements[*at].kind == TokenKind::Word
-                && matches!(
-                    word,
-                    "the"
-                        | "this"
-                        | "a"
-                        | "that"
-                        | "given"
-                        | "provided"
-                        | "your"
-                        | "entire"
-                        | "whole"
-                )
-    };
     let Some(within) = (start..noun)
         .rev()
-        .find(|at| !article(at))
+        .find(|at| !is_determiner_or_color(clauses, *at))
         .filter(|at| elements[*at].has(Role::Within))
     else {
         return true;
     };
     within > start && elements[within - 1].has(Role::Portion)
+}
+
+fn is_determiner_or_color(clauses: &Clauses<'_>, at: usize) -> bool {
+    const DETERMINERS: [&str; 9] = [
+        "the", "this", "a", "that", "given", "provided", "your", "entire", "whole",
+    ];
+    let element = &clauses.elements[at];
+    is_color(clauses, at)
+        || (element.kind == TokenKind::Word && DETERMINERS.contains(&element.slice(clauses.folded)))
 }

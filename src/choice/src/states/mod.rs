@@ -6,8 +6,8 @@ pub(super) mod determiner;
 mod exclusions;
 mod image_words;
 mod questions;
-mod reach;
 mod repetitions;
+mod scope;
 
 pub(super) use conditions::conditional;
 pub(super) use denials::denied;

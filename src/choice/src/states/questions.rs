@@ -1,21 +1,21 @@
-//! Stretches of a text in which names are questioned: [`questioned`].
+//! [`questioned`]: ranges of a text in which choices are questioned.
 
-use super::reach::ends;
-use crate::named::Names;
+use super::scope::ends_scope;
+use crate::name_index::Names;
 use crate::text::words::Role;
 use crate::text::{Boundary, Clauses, Ranges};
 
-/// The sentences with a question mark, and what follows "whether", "you asked" and their like. A whole reply that is a bare
-/// name with a question mark is a shy answer, and asks nothing.
+/// Ranges of sentences with a question mark, and of the words after phrases such as "whether" and "you asked". A reply that is only a name
+/// with a question mark is an unsure answer and not a question.
 pub(crate) fn questioned(clauses: &Clauses<'_>, names: &Names<'_>) -> Ranges {
     let mut ranges = Vec::new();
     let (mut sentence, mut open) = (0, None);
-    let shy = is_bare_name(clauses, names);
+    let is_unsure_answer = is_bare_name(clauses, names);
     for (at, element) in clauses.elements.iter().enumerate() {
-        if ends(clauses, names, open, at) {
+        if ends_scope(clauses, names, open, at) {
             ranges.extend(open.take().map(|start| (start, element.start)));
         }
-        if clauses.is_sign(at, &['?', '？', '؟']) && !shy {
+        if clauses.is_sign(at, &['?', '？', '؟']) && !is_unsure_answer {
             ranges.push((sentence, element.end));
         }
         if element.boundary == Boundary::Sentence {
@@ -29,7 +29,7 @@ pub(crate) fn questioned(clauses: &Clauses<'_>, names: &Names<'_>) -> Ranges {
     Ranges::new(ranges)
 }
 
-/// Whether the text is a name and question marks: "Kitchen?", "(B)?", "B. kitchen?", "The kitchen?".
+/// True if the text is a name with question marks: "Kitchen?", "(B)?", "B. kitchen?", "The kitchen?".
 fn is_bare_name(clauses: &Clauses<'_>, names: &Names<'_>) -> bool {
     let text = clauses
         .folded
@@ -38,19 +38,16 @@ fn is_bare_name(clauses: &Clauses<'_>, names: &Names<'_>) -> bool {
         return false;
     }
     let text_end = text.trim_end_matches([')', ']']).len();
-    let fills = |start: usize| {
-        names
-            .text_at(start)
-            .is_some_and(|name| name.end == text_end)
-    };
+    if names.text_at(0).is_some_and(|name| name.end == text_end) {
+        return true;
+    }
     let letter = names.letters.first().filter(|letter| {
         text[..letter.start]
             .trim_matches(['(', '[', ' '])
             .is_empty()
     });
-    let labelled = letter.is_some_and(|letter| {
+    letter.is_some_and(|letter| {
         let text = names.labelled_text(letter);
         letter.end == text_end || text.is_some_and(|text| text.end == text_end)
-    });
-    labelled || fills(0)
+    })
 }

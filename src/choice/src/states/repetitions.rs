@@ -1,15 +1,17 @@
-//! Lists of all choices in a text, which repeat the prompt: [`repetitions`].
+//! [`repetitions`]: lists of all choices in a text, which only repeat the prompt.
+
+use std::ops::Range;
 
 use crate::choice_views::ChoiceViews;
-use crate::named::Names;
+use crate::name_index::Names;
 use crate::names::Name;
 use crate::text::Ranges;
 
 /// Maximum number of bytes between two choices of a list.
 const MAX_GAP: usize = 24;
 
-/// The stretches that list all choices in the order shown, by their texts or letters, with nothing between them but labels and
-/// separators. Two choices alone make a list only with labels or a heading, on a line of their own, or if they are yes and no.
+/// Ranges that list all choices in the order shown, by text or letter, with only labels and separators between them. A question with two
+/// choices needs more evidence of a list ([`is_list_of_two`]).
 pub(crate) fn repetitions(names: &Names<'_>, offered: &ChoiceViews) -> Ranges {
     let count = offered.texts.len();
     let by_text = lists(names, &names.texts, count, offered);
@@ -25,12 +27,12 @@ fn lists(
     offered: &ChoiceViews,
 ) -> Vec<(usize, usize)> {
     let mut lists = Vec::new();
-    // First name of the list that is being followed, and number of its names so far.
+    // Index of the first name of the current list, and number of its names so far.
     let (mut first, mut length) = (0, 0);
     for (at, name) in all.iter().enumerate() {
         let follows = length > 0
             && name.choice == Some(length)
-            && separates(names.folded, all[at - 1].end, name.start);
+            && is_separator(names.folded, all[at - 1].end, name.start);
         if follows {
             length += 1;
         } else {
@@ -38,7 +40,7 @@ fn lists(
         }
         if length == count {
             let (start, end) = with_labels(names.folded, all[first].start, name.end);
-            if count > 2 || is_list_of_two(names, offered, &all[first..=at], (start, end)) {
+            if count > 2 || is_list_of_two(names, offered, &all[first..=at], start..end) {
                 lists.push((start, end));
             }
             length = 0;
@@ -47,8 +49,8 @@ fn lists(
     lists
 }
 
-/// Whether only separators, labels and words of a list stand between two bytes.
-fn separates(folded: &str, start: usize, end: usize) -> bool {
+/// True if the text between two bytes consists of separators, labels and words such as "and".
+fn is_separator(folded: &str, start: usize, end: usize) -> bool {
     let Some(gap) = folded.get(start..end).filter(|gap| gap.len() <= MAX_GAP) else {
         return false;
     };
@@ -59,7 +61,7 @@ fn separates(folded: &str, start: usize, end: usize) -> bool {
         })
 }
 
-/// The list with the label before its first choice and the one behind its last.
+/// The range of a list, extended by the label before its first choice and the one after its last.
 fn with_labels(folded: &str, start: usize, end: usize) -> (usize, usize) {
     let before = folded[..start].trim_end_matches(['(', '[', ')', ']', '.', ':', '-', ' ']);
     let label =
@@ -80,34 +82,31 @@ fn with_labels(folded: &str, start: usize, end: usize) -> (usize, usize) {
     )
 }
 
-/// Whether two choices are listed, and not stated in a sentence.
+/// True if two choices are listed rather than stated in a sentence: with a heading or labels, alone on a line, or as "yes or no".
 fn is_list_of_two(
     names: &Names<'_>,
     offered: &ChoiceViews,
     list: &[Name],
-    (start, end): (usize, usize),
+    span: Range<usize>,
 ) -> bool {
+    let Range { start, end } = span;
     let folded = names.folded;
     let (before, after) = (
         folded[..start].trim_end_matches(' '),
         folded[end..].trim_start_matches(['.', ' ']),
     );
-    let headed = before.ends_with(':') && {
-        let heading = before
-            .trim_end_matches(':')
-            .rsplit(|c: char| !c.is_alphabetic())
-            .next();
-        matches!(heading, Some("options" | "choices" | "answers"))
-    };
-    let labelled = start < list[0].start && {
-        let from = names.letters.partition_point(|letter| letter.start < start);
-        names.letters[from..]
-            .iter()
-            .take_while(|letter| letter.start < end)
-            .filter(|letter| names.labelled_text(letter).is_some())
-            .count()
-            >= 2
-    };
+    let last_word = before
+        .trim_end_matches(':')
+        .rsplit(|c: char| !c.is_alphabetic())
+        .next();
+    let headed =
+        before.ends_with(':') && matches!(last_word, Some("options" | "choices" | "answers"));
+    let labels = names
+        .letters
+        .iter()
+        .filter(|letter| (start..end).contains(&letter.start))
+        .filter(|letter| names.labelled_text(letter).is_some());
+    let labelled = start < list[0].start && labels.count() >= 2;
     let gap = folded[list[0].end..list[1].start].trim();
     let paired = offered.yes_no.is_some() && matches!(gap, "or" | "/" | "and/or");
     let whole = (before.is_empty() || before.ends_with('\n'))

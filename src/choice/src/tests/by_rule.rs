@@ -1,4 +1,4 @@
-//! The rules of the lenient parsing, each on replies that it must not read and on replies that it must.
+//! Tests of each lenient rule, on replies that must be parsed and on replies that must not.
 
 use std::collections::BTreeMap;
 
@@ -7,7 +7,7 @@ use serde::Deserialize;
 use crate::{ReadingMode, read};
 use darkqa_ground::types::questions::{Answer, Choices};
 
-/// One line of the table: the rule, the set of choices, the reply, and the choice that a person reads in it.
+/// One line of the table: the rule, the set of choices, the reply, and the choice that a person finds in it.
 #[derive(Deserialize)]
 struct Case {
     rule: String,
@@ -37,11 +37,11 @@ pub(super) fn choices(set: &str) -> Choices {
     super::choices_of(texts)
 }
 
-/// Minimum number of replies of a rule that are read, and of those that are not.
+/// Minimum number of replies of a rule that are parsed, and of replies that are not.
 const EACH_WAY: usize = 3;
 
 #[test]
-fn each_rule_reads_what_a_person_reads_and_nothing_else() {
+fn rules_agree_with_a_person() {
     let mut wrong = Vec::new();
     let mut counts = BTreeMap::<String, [usize; 2]>::new();
     for line in include_str!("../../../../tests/data/replies_by_rule.jsonl").lines() {
@@ -69,9 +69,9 @@ fn each_rule_reads_what_a_person_reads_and_nothing_else() {
     }
 }
 
-/// A reply whose strict parsing is a choice has that choice in the lenient parsing as well, whatever the rules.
+/// If the strict parsing finds a choice, the lenient parsing finds the same, whatever the rules.
 #[test]
-fn the_strict_reading_is_not_changed_by_any_rule() {
+fn rules_do_not_change_the_strict_parsing() {
     for (reply, set, index) in [
         ("no", "yes_no", 1),
         ("black.", "colors", 0),

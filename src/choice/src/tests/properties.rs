@@ -26,7 +26,7 @@ const SENTENCES: [&str; 6] = [
     "the {}, I think",
 ];
 
-/// The replies of the table that end with a sentence and hold no markup that a question could be inside of.
+/// The replies of the table that end with a sentence and have no markup, which could enclose an appended question.
 fn whole_sentences() -> Vec<String> {
     let mut replies = super::table_of_replies();
     replies.retain(|reply| {
@@ -37,7 +37,7 @@ fn whole_sentences() -> Vec<String> {
 
 proptest! {
     #[test]
-    fn a_denial_before_a_lone_name_never_yields_it(
+    fn denied_lone_names_are_not_chosen(
         set in prop::sample::select(vec!["home", "things", "sofas"]),
         pick in 0..100usize,
         denial in 0..1000usize,
@@ -59,7 +59,7 @@ proptest! {
     }
 
     #[test]
-    fn a_hyphen_for_a_blank_in_a_name_changes_nothing(
+    fn hyphens_in_names_change_nothing(
         sentence in prop::sample::select(&SENTENCES[..]),
         hyphen in prop::sample::select(&["-", "\u{2010}", "\u{2011}", "\u{2012}", "\u{2013}", "\u{2212}"][..]),
         name in prop::sample::select(&["living room", "sofa bed", "dining table", "dark blue"][..]),
@@ -70,15 +70,15 @@ proptest! {
             "dining table" => "tables",
             _ => "shades",
         };
-        let with = |name: &str| lenient(&sentence.replace("{}", name), set);
-        let blank = with(name);
+        let [blank, hyphenated, joined] =
+            [" ", hyphen, ""].map(|gap| lenient(&sentence.replace("{}", &name.replace(' ', gap)), set));
         prop_assert!(matches!(blank, Answer::Chosen(_)), "{} {:?}", name, blank);
-        prop_assert_eq!(with(&name.replace(' ', hyphen)), blank);
-        prop_assert_eq!(with(&name.replace(' ', "")), blank);
+        prop_assert_eq!(hyphenated, blank);
+        prop_assert_eq!(joined, blank);
     }
 
     #[test]
-    fn an_appended_question_changes_nothing(
+    fn appended_questions_change_nothing(
         reply in prop::sample::select(whole_sentences()),
         question in prop::sample::select(&["Is it a kitchen?", "Could this be B?", "Do you agree?", "Or is it the bathroom?"][..]),
     ) {
@@ -92,7 +92,7 @@ proptest! {
     }
 
     #[test]
-    fn the_text_of_what_is_read_reads_the_same(reply in reply(), set in prop::sample::select(&SETS[..])) {
+    fn chosen_text_parses_as_the_choice(reply in reply(), set in prop::sample::select(&SETS[..])) {
         if let Answer::Chosen(index) = lenient(&reply, set) {
             let texts = choices(set);
             for mode in ReadingMode::ALL {
@@ -102,10 +102,10 @@ proptest! {
     }
 }
 
-/// A step whose time grew with the square of the length would take hours.
+/// A step with quadratic run time would take hours.
 #[test]
-fn two_megabytes_of_any_word_are_read() {
-    /// Time for one such reply in a build without optimization; a release build takes less than a second.
+fn parsing_takes_linear_time() {
+    /// Time limit for one reply in a build without optimization; a release build takes less than a second.
     const LIMIT: Duration = Duration::from_secs(30);
     const LENGTH: usize = 2_000_000;
     let signs = [

@@ -1,4 +1,4 @@
-//! Every entry of `words.toml` in a reply that is read otherwise without it.
+//! Tests that every entry of `words.toml` changes the parsing of a reply.
 
 use super::by_rule::choices;
 use super::choices_of;
@@ -8,8 +8,8 @@ use crate::text::{fold, tokens};
 use crate::{ReadingMode, read};
 use darkqa_ground::types::questions::Answer;
 
-/// For each role: a set of choices, a reply with an entry in place of `{}` and the choice in it, and a reply without an entry and the
-/// choice in that.
+/// A role, a set of choices, a reply in which an entry of the role replaces `{}`, the choice in it, a reply without such an entry, and the
+/// choice in that reply.
 type Example = (
     Role,
     &'static str,
@@ -65,8 +65,8 @@ const EXAMPLES: [Example; 42] = [
     (Role::Portion, "colors", "The {} of the image is black.", None, "The sofa of the image is black.", Some(0)),
 ];
 
-/// The roles of words that choices are made of; they have a test of their own.
-const OF_CHOICES: [Role; 4] = [Role::Color, Role::Shade, Role::Place, Role::Number];
+/// The roles of words in choices, which have a separate test.
+const CHOICE_ROLES: [Role; 4] = [Role::Color, Role::Shade, Role::Place, Role::Number];
 
 fn lenient(set: &str, reply: &str) -> Option<usize> {
     match read(reply, &choices(set), ReadingMode::Lenient) {
@@ -80,7 +80,7 @@ fn every_entry_decides_a_reply() {
     let mut wrong = Vec::new();
     for (role, list) in lists() {
         assert!(!list.is_empty(), "{role:?}");
-        if role == Role::Neutral || OF_CHOICES.contains(&role) {
+        if role == Role::Neutral || CHOICE_ROLES.contains(&role) {
             continue;
         }
         let (_, set, reply, found, control, other) = EXAMPLES
@@ -88,7 +88,7 @@ fn every_entry_decides_a_reply() {
             .find(|(of, ..)| *of == role)
             .unwrap_or_else(|| panic!("{role:?}"));
         for word in list {
-            // "It's" has its verb.
+            // "It's" already contains the verb.
             let reply = reply.replace("{}", &word).replace("'s is ", "'s ");
             for (reply, found) in [(reply.as_str(), found), (control, other)] {
                 let read = lenient(set, reply);
@@ -123,16 +123,11 @@ fn every_neutral_phrase_hides_an_active_word() {
     for phrase in &lists()[&Role::Neutral] {
         let folded = fold(phrase);
         let words = tokens(&folded);
-        let acts = |start: usize, end: usize| {
-            let known = phrase_at(&folded, &words[start..end]);
-            known.is_some_and(|(_, roles)| {
-                roles != Roles::from_role(Role::Neutral) && roles.has_any(&ACTIVE)
-            })
-        };
         let hides = (0..words.len())
             .flat_map(|start| (start + 1..=words.len()).map(move |end| (start, end)))
             .filter(|(start, end)| end - start < words.len())
-            .any(|(start, end)| acts(start, end));
+            .filter_map(|(start, end)| phrase_at(&folded, &words[start..end]))
+            .any(|(_, roles)| roles != Roles::from_role(Role::Neutral) && roles.has_any(&ACTIVE));
         assert!(hides, "{phrase:?} hides nothing");
         assert_eq!(
             lenient("home", &format!("{phrase} the kitchen.")),
@@ -143,9 +138,8 @@ fn every_neutral_phrase_hides_an_active_word() {
 }
 
 #[test]
-fn colors_and_places_are_no_things() {
+fn colors_and_places_are_not_things() {
     let lists = lists();
-    let naming = |word: &str| ChoiceViews::new(&choices_of(&[word, "kitchen"])).naming;
     for role in [Role::Color, Role::Shade] {
         for word in &lists[&role] {
             assert_eq!(naming(word), [Naming::Color, Naming::Thing], "{word}");
@@ -161,7 +155,12 @@ fn colors_and_places_are_no_things() {
     assert_eq!(naming("12")[0], Naming::Attribute);
 }
 
-/// Last words of object names in questions that are no heads, and an object that keeps its meaning with the word behind it.
+/// The kinds of a choice with this text and of "kitchen".
+fn naming(word: &str) -> Vec<Naming> {
+    ChoiceViews::new(&choices_of(&[word, "kitchen"])).naming
+}
+
+/// Last words of object names that are not in the list of heads, each with an object whose name keeps its meaning before that word.
 const NO_HEADS: [(&str, &str); 4] = [
     ("photo", "kitchen"),
     ("monitor", "TV"),
@@ -169,14 +168,13 @@ const NO_HEADS: [(&str, &str); 4] = [
     ("machine", "dishwasher"),
 ];
 
-/// The things that the rulebook of the questions names are all called by a noun that makes another thing of a name before it.
+/// The last word of every object name in the question rules is in the list of heads.
 #[test]
-fn every_thing_of_the_questions_ends_in_a_head() {
+fn object_names_end_in_a_head() {
     let rules: toml::Table = include_str!("../../../questions/src/rules.toml")
         .parse()
         .unwrap();
     let heads = &lists()[&Role::Head];
-    let is_head = |name: &str| heads.contains(&name.to_lowercase());
     let (mut known, mut missing) = (0, Vec::new());
     for (_, class) in rules["class"].as_table().unwrap() {
         for word in class
@@ -186,9 +184,10 @@ fn every_thing_of_the_questions_ends_in_a_head() {
             .flatten()
         {
             let last = word.as_str().unwrap().split(' ').next_back().unwrap();
+            let is_head = heads.contains(&last.to_lowercase());
             if NO_HEADS.iter().any(|(word, _)| *word == last) {
-                assert!(!is_head(last), "{last}");
-            } else if is_head(last) {
+                assert!(!is_head, "{last}");
+            } else if is_head {
                 known += 1;
             } else {
                 missing.push(last.to_owned());
@@ -199,14 +198,14 @@ fn every_thing_of_the_questions_ends_in_a_head() {
     assert!(known > 60, "{known}");
     for (word, thing) in NO_HEADS {
         let choices = choices_of(&[thing, "sofa"]);
-        let reading = |behind: &str| {
-            let reply = format!("A {thing} {behind}.");
-            read(&reply, &choices, ReadingMode::Lenient)
-        };
-        assert_eq!(reading(word), Answer::Chosen(0), "{thing} {word}");
-        assert!(
-            matches!(reading("cupboard"), Answer::Unparsed(_)),
-            "{thing}"
-        );
+        let [object, other] = [word, "cupboard"].map(|next| {
+            read(
+                &format!("A {thing} {next}."),
+                &choices,
+                ReadingMode::Lenient,
+            )
+        });
+        assert_eq!(object, Answer::Chosen(0), "{thing} {word}");
+        assert!(matches!(other, Answer::Unparsed(_)), "{thing}");
     }
 }

@@ -1,12 +1,12 @@
-//! A text cut into words, phrases and clauses, once for all steps: [`Clauses`].
+//! [`Clauses`]: a text cut into words, phrases and clauses.
 
 use super::tokens::{Token, TokenKind};
 use super::words::{Role, Roles, phrase_at};
 
-/// Unit of the text that ends at an element.
+/// The largest unit of the text that ends at an element.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Boundary {
-    /// Nothing.
+    /// No unit ends here.
     None,
     /// A part of a clause: a comma, a bracket, a dash, "because".
     Part,
@@ -32,7 +32,7 @@ pub(crate) struct Element {
 }
 
 impl Element {
-    /// The element's characters in the text that it comes from.
+    /// The element's part of the text.
     pub(crate) fn slice<'a>(&self, folded: &'a str) -> &'a str {
         &folded[self.start..self.end]
     }
@@ -41,8 +41,8 @@ impl Element {
         self.roles.has(role)
     }
 
-    /// Whether a clause ends here.
-    pub(crate) fn cuts(&self) -> bool {
+    /// True if a clause or sentence ends at the element.
+    pub(crate) fn ends_clause(&self) -> bool {
         self.boundary >= Boundary::Clause
     }
 }
@@ -54,7 +54,7 @@ pub(crate) struct Clauses<'a> {
 }
 
 impl<'a> Clauses<'a> {
-    /// The elements of a text in lower case, of these tokens.
+    /// Groups the tokens of a text in lower case into elements.
     pub(crate) fn new(folded: &'a str, tokens: &[Token]) -> Self {
         let mut elements = Vec::with_capacity(tokens.len());
         let mut at = 0;
@@ -62,7 +62,7 @@ impl<'a> Clauses<'a> {
             let (count, mut roles) =
                 phrase_at(folded, &tokens[at..]).unwrap_or((1, Roles::default()));
             if count > 1 {
-                roles = roles.with(inner(folded, &tokens[at..at + count]));
+                roles = roles.union(word_roles(folded, &tokens[at..at + count]));
             }
             let end = tokens[at + count - 1].end;
             elements.push(Element {
@@ -77,14 +77,14 @@ impl<'a> Clauses<'a> {
         Self { folded, elements }
     }
 
-    /// Index of the first element that begins at a byte or behind it.
+    /// Index of the first element that begins at a byte or after it.
     pub(crate) fn index(&self, byte: usize) -> usize {
         self.elements
             .partition_point(|element| element.start < byte)
     }
 
-    /// The element that begins at a byte, with spaces before it.
-    pub(crate) fn from(&self, byte: usize) -> Option<&Element> {
+    /// The next element after a byte, if only spaces are between them.
+    pub(crate) fn element_at(&self, byte: usize) -> Option<&Element> {
         let element = self.elements.get(self.index(byte))?;
         self.folded[byte..element.start]
             .trim()
@@ -92,25 +92,25 @@ impl<'a> Clauses<'a> {
             .then_some(element)
     }
 
-    /// Whether an element is one of these signs.
+    /// True if the element at an index is one of these signs.
     pub(crate) fn is_sign(&self, at: usize, signs: &[char]) -> bool {
         self.elements.get(at).is_some_and(|element| {
             element.kind == TokenKind::Sign && element.slice(self.folded).starts_with(signs)
         })
     }
 
-    /// Whether a clause or a part of one ends before an element, or the text begins with it.
-    pub(crate) fn begins(&self, at: usize) -> bool {
+    /// True if the element at an index begins a clause or a part of one.
+    pub(crate) fn begins_part(&self, at: usize) -> bool {
         at == 0 || self.elements[at - 1].boundary > Boundary::None
     }
 
-    /// Whether an element may stand between a verb and its predicate.
+    /// True for an adverb, which may be between a verb and its predicate.
     pub(crate) fn is_adverb(&self, at: usize) -> bool {
         let element = &self.elements[at];
         element.has(Role::Adverb) || element.slice(self.folded).ends_with("ly")
     }
 
-    /// Index of the element before a predicate, behind adverbs: its verb, if it has one.
+    /// Index of the element before a predicate and its adverbs, which is the verb if there is one.
     pub(crate) fn verb_before(&self, at: usize) -> Option<usize> {
         let mut verb = at.checked_sub(1)?;
         let first = verb.saturating_sub(MAX_ADVERBS);
@@ -120,8 +120,8 @@ impl<'a> Clauses<'a> {
         Some(verb)
     }
 
-    /// Makes the sign at a byte end nothing: the point of "B. kitchen".
-    pub(crate) fn join(&mut self, byte: usize) {
+    /// Removes the boundary of the sign at a byte, because the full stop in "B. kitchen" ends no sentence.
+    pub(crate) fn remove_boundary(&mut self, byte: usize) {
         let at = self.index(byte);
         if let Some(element) = self
             .elements
@@ -133,21 +133,28 @@ impl<'a> Clauses<'a> {
     }
 }
 
-/// The roles of a phrase that follow from its words: "it is" has a pronoun and a verb; "i'd say" is counterfactual.
-fn inner(folded: &str, words: &[Token]) -> Roles {
-    const ANY: Roles = Roles::from_role(Role::ModalPast).with(Roles::from_role(Role::Image));
-    const FIRST: Roles = ANY.with(Roles::from_role(Role::Pronoun));
-    const LAST: Roles = ANY.with(Roles::from_role(Role::Copula));
-    let own = |at: usize| {
-        let known = phrase_at(folded, std::slice::from_ref(&words[at]));
-        known.map_or(Roles::default(), |(_, roles)| roles)
-    };
+/// Roles that a phrase inherits from its words: "it is" has a pronoun and a verb; "i'd say" is counterfactual.
+fn word_roles(folded: &str, words: &[Token]) -> Roles {
+    const ANY: Roles = Roles::from_role(Role::ModalPast).union(Roles::from_role(Role::Image));
+    const FIRST: Roles = ANY.union(Roles::from_role(Role::Pronoun));
+    const LAST: Roles = ANY.union(Roles::from_role(Role::Copula));
     let last = words.len() - 1;
-    let middle = (1..last).fold(Roles::default(), |roles, at| roles.with(own(at).both(ANY)));
-    middle.with(own(0).both(FIRST)).with(own(last).both(LAST))
+    words
+        .iter()
+        .enumerate()
+        .map(|(at, word)| {
+            let inherited = match at {
+                0 => FIRST,
+                at if at == last => LAST,
+                _ => ANY,
+            };
+            phrase_at(folded, std::slice::from_ref(word))
+                .map_or(Roles::default(), |(_, roles)| roles.intersection(inherited))
+        })
+        .fold(Roles::default(), Roles::union)
 }
 
-/// Unit of the text that ends at an element.
+/// The largest unit of the text that ends at an element.
 fn boundary(kind: TokenKind, roles: Roles, characters: &str) -> Boundary {
     match kind {
         TokenKind::Break => Boundary::Sentence,

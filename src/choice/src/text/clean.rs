@@ -8,10 +8,10 @@ use unicode_normalization::UnicodeNormalization;
 
 use darkqa_ground::types::questions::UnreadReason;
 
-/// The marks of one family of models, a table of `reasoning.toml`.
+/// Regular expressions for the begin and end of reasoning in one model family, a table of `reasoning.toml`.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Mark {
+struct ReasoningMark {
     #[expect(dead_code, reason = "documents the table")]
     family: String,
     #[expect(dead_code, reason = "documents the table")]
@@ -21,29 +21,36 @@ struct Mark {
 }
 
 #[derive(Debug, Default, Deserialize)]
-struct Marks {
-    mark: Vec<Mark>,
+struct ReasoningMarks {
+    mark: Vec<ReasoningMark>,
 }
 
-static MARKS: LazyLock<Vec<Mark>> = LazyLock::new(|| {
-    let marks: Marks = toml::from_str(include_str!("../reasoning.toml")).unwrap_or_default();
+static MARKS: LazyLock<Vec<ReasoningMark>> = LazyLock::new(|| {
+    let marks: ReasoningMarks =
+        toml::from_str(include_str!("../reasoning.toml")).unwrap_or_default();
     marks.mark
 });
 
 /// Marks that end a reasoning block.
 static END: LazyLock<Regex> = LazyLock::new(|| {
-    let ends = MARKS.iter().map(|mark| format!("(?:{})", mark.end));
-    compiled(&format!("(?i){}", ends.collect::<Vec<_>>().join("|")))
+    let ends: Vec<String> = MARKS
+        .iter()
+        .map(|mark| format!("(?:{})", mark.end))
+        .collect();
+    compiled(&format!("(?i){}", ends.join("|")))
 });
 
 /// Marks that begin a reasoning block.
 static BEGIN: LazyLock<Regex> = LazyLock::new(|| {
-    let begins = MARKS.iter().map(|mark| format!("(?:{})", mark.begin));
-    compiled(&format!("(?i){}", begins.collect::<Vec<_>>().join("|")))
+    let begins: Vec<String> = MARKS
+        .iter()
+        .map(|mark| format!("(?:{})", mark.begin))
+        .collect();
+    compiled(&format!("(?i){}", begins.join("|")))
 });
 
-/// The name of Gemma's channel alone on the first line, which is left of its marks if a server drops special tokens.
-static NAME_OF_CHANNEL: LazyLock<Regex> = LazyLock::new(|| compiled(r"\A\s*thought[ \t]*\r?\n"));
+/// The name of Gemma's reasoning channel alone on the first line. A server that drops special tokens leaves only this name.
+static CHANNEL_NAME: LazyLock<Regex> = LazyLock::new(|| compiled(r"\A\s*thought[ \t]*\r?\n"));
 
 /// The end of the harmony format's final channel.
 static HARMONY_CLOSE: LazyLock<Regex> =
@@ -67,7 +74,7 @@ static TOKEN: LazyLock<Regex> = LazyLock::new(|| {
     ))
 });
 
-/// The beginning of the next question, which a model that does not stop asks itself.
+/// The start of a next question in the reply of a model that does not stop but continues the dialogue.
 static NEXT_TURN: LazyLock<Regex> = LazyLock::new(|| {
     compiled(concat!(
         r"(?i)\n[#*>\s]*(?:(?:next |new )?question|q|user|human|instruction|frage|pregunta|pergunta|domanda|vraag",
@@ -75,10 +82,10 @@ static NEXT_TURN: LazyLock<Regex> = LazyLock::new(|| {
     ))
 });
 
-/// The text after the last marker that ends reasoning, trimmed.
+/// The text after the last reasoning block, trimmed.
 ///
 /// # Errors
-/// If nothing is left to read, the reason.
+/// The reason why no answer can be read, if the reasoning does not end or no text follows.
 pub(crate) fn without_reasoning(reply: &str) -> Result<&str, UnreadReason> {
     let (mut text, marker) = match END.find_iter(reply).last() {
         Some(marker) => (&reply[marker.end()..], marker.as_str()),
@@ -98,15 +105,15 @@ pub(crate) fn without_reasoning(reply: &str) -> Result<&str, UnreadReason> {
     }
 }
 
-/// The text behind the name of a channel of reasoning whose marks a server dropped; `None` without one. Where the reasoning ends cannot
-/// be told.
-pub(crate) fn behind_channel(text: &str) -> Option<&str> {
-    let name = NAME_OF_CHANNEL.find(text)?;
+/// The text after the name of a reasoning channel whose marks a server dropped; `None` without such a name. The end of the reasoning is
+/// unknown.
+pub(crate) fn after_channel_name(text: &str) -> Option<&str> {
+    let name = CHANNEL_NAME.find(text)?;
     Some(text[name.end()..].trim_matches(is_blank))
 }
 
-/// The text in compatibility form (NFKC) without invisible characters and template tokens. It ends at the first token that
-/// ends a turn with text.
+/// Normalizes a text to NFKC, removes invisible characters and template tokens, and cuts it at the end of the first turn that contains
+/// text.
 pub(crate) fn tidy(text: &str) -> String {
     let mut text: String = if text.is_ascii() {
         text.to_owned()
@@ -134,13 +141,13 @@ pub(crate) fn tidy(text: &str) -> String {
     TOKEN.replace_all(&turn, " ").trim().to_owned()
 }
 
-/// The text before the next question that a model asks itself, if there is any.
+/// The text before a next question that a model asks itself; `None` without such a question, or without text before it.
 pub(crate) fn before_next_turn(text: &str) -> Option<&str> {
     let next = NEXT_TURN.find(text)?;
     Some(text[..next.start()].trim()).filter(|text| !text.is_empty())
 }
 
-/// Whether a character has no width: joiners, direction and byte order marks, variation selectors.
+/// True for a character without width: joiners, direction and byte order marks, variation selectors.
 fn is_invisible(c: char) -> bool {
     matches!(c, '\u{ad}' | '\u{34f}' | '\u{61c}' | '\u{180e}' | '\u{200b}'..='\u{200f}' | '\u{202a}'..='\u{202e}'
         | '\u{2060}'..='\u{206f}' | '\u{fe00}'..='\u{fe0f}' | '\u{feff}' | '\u{e0000}'..='\u{e01ef}')
@@ -150,7 +157,7 @@ fn is_blank(c: char) -> bool {
     c.is_whitespace() || is_invisible(c)
 }
 
-/// A compiled literal pattern; the tests compile every one.
+/// Compiles a literal pattern; the tests compile all of them.
 #[expect(clippy::expect_used, reason = "a literal that the tests compile")]
 pub(crate) fn compiled(pattern: &str) -> Regex {
     Regex::new(pattern).expect("a literal pattern")

@@ -26,15 +26,15 @@ static TAG: LazyLock<Regex> =
     LazyLock::new(|| compiled(r#"</?[A-Za-z][A-Za-z0-9_-]{0,30}(?:\s+[a-z-]+="[^"<>]*")*\s*/?>"#));
 static LINE_START: LazyLock<Regex> =
     LazyLock::new(|| compiled(r"(?m)^[ \t]*(?:(?:#{1,6}|>|[-+•·▪◦‣●○■–—])[ \t]+)+"));
-/// The box of a task list, before its text.
+/// The check box of a task list item, at the start of a line.
 static TASK: LazyLock<Regex> =
     LazyLock::new(|| compiled(r"(?m)^[ \t]*(?:(?:[-+*•]|\d+[.)])[ \t]+)?\[[ xX]\][ \t]+"));
-/// A box anywhere, in a text that has an empty one.
+/// A check box anywhere. Removed only if the text contains an empty one.
 static BOX: LazyLock<Regex> = LazyLock::new(|| compiled(r"\[[ xX]\]"));
 /// Maximum depth of LaTeX groups that are unwrapped.
 const LATEX_DEPTH: usize = 4;
 
-/// The text without markup, one space between words, no empty lines, trimmed.
+/// Removes markup, repeated spaces, empty lines and outer spaces.
 pub(crate) fn plain(text: &str) -> String {
     let text = LETTER_TAG.replace(text.trim(), "($1)");
     let mut text = if text.contains("```") {
@@ -59,7 +59,7 @@ pub(crate) fn plain(text: &str) -> String {
     with_single_spaces(&text)
 }
 
-/// The text with the content of LaTeX groups in their place, and without signs of LaTeX.
+/// Replaces LaTeX groups by their content and removes other LaTeX commands.
 fn without_latex(mut text: String) -> String {
     for _ in 0..LATEX_DEPTH {
         match LATEX_GROUP.replace_all(&text, "$1") {
@@ -70,7 +70,7 @@ fn without_latex(mut text: String) -> String {
     LATEX_SIGN.replace_all(&text, " ").into_owned()
 }
 
-/// The trimmed text with a line break for each stretch of white space that has one, and a space for any other.
+/// Trims a text and replaces each run of white space by one line break if the run contains one, otherwise by a space.
 fn with_single_spaces(text: &str) -> String {
     let mut single = String::with_capacity(text.len());
     let mut gap = None;
@@ -89,26 +89,26 @@ fn with_single_spaces(text: &str) -> String {
     single
 }
 
-/// An en dash between two letters, in one byte, as long as a hyphen: "living–room" is a name, "kitchen–bathroom" is two.
+/// Stands for an en dash between two letters. It takes one byte, as a hyphen does: "living–room" is one name, "kitchen–bathroom" two.
 pub(crate) const RANGE: char = '\u{1e}';
 
-/// The text without emphasis, quotes and pictographs. A cross mark becomes "not", any hyphen between letters "-".
+/// Removes emphasis, quotes and pictographs. A cross mark becomes "not", and every hyphen between letters becomes "-".
 fn without_signs(text: &str) -> String {
     let mut plain = String::with_capacity(text.len());
     let mut previous = None;
     let mut rest = text.chars().peekable();
     while let Some(c) = rest.next() {
         let next = rest.peek().copied();
-        let inside =
+        let is_inside_word =
             previous.is_some_and(char::is_alphanumeric) && next.is_some_and(char::is_alphanumeric);
-        let compound =
+        let is_compound =
             previous.is_some_and(char::is_alphabetic) && next.is_some_and(char::is_alphabetic);
         match c {
-            '‐' | '‑' | '‒' | '−' if compound => plain.push('-'),
-            '–' if compound => plain.push(RANGE),
+            '‐' | '‑' | '‒' | '−' if is_compound => plain.push('-'),
+            '–' if is_compound => plain.push(RANGE),
             RANGE => plain.push(' '),
-            '\'' | '’' | '‘' | 'ʼ' if inside => plain.push('\''),
-            '_' if inside => plain.push('_'),
+            '\'' | '’' | '‘' | 'ʼ' if is_inside_word => plain.push('\''),
+            '_' if is_inside_word => plain.push('_'),
             '*' | '`' | '$' | '_' | '\'' | '’' | '‘' | '‚' | '"' | '“' | '”' | '„' | '‟' | '«'
             | '»' | '‹' | '›' | '「' | '」' | '『' | '』' | '《' | '》' | '〈' | '〉' | '″' =>
                 {}
@@ -128,30 +128,33 @@ fn without_signs(text: &str) -> String {
     plain
 }
 
-/// The text in lower case with the same byte positions: a character whose lower case has another length stays as it is. A
-/// hyphen between two letters becomes a blank, and "grey" becomes "gray".
+/// Converts a text to lower case without moving byte positions: a character whose lower case has another length is kept. A hyphen
+/// between two letters becomes a space, and "grey" becomes "gray".
 pub(crate) fn fold(text: &str) -> String {
-    let lower = |c: char| {
-        if c.is_ascii() {
-            return c.to_ascii_lowercase();
-        }
-        let mut lower = c.to_lowercase();
-        match (lower.next(), lower.next()) {
-            (Some(l), None) if l.len_utf8() == c.len_utf8() => l,
-            _ => c,
-        }
-    };
     let mut folded = String::with_capacity(text.len());
     let mut rest = text.chars().peekable();
-    let mut letter = false;
+    let mut follows_letter = false;
     while let Some(c) = rest.next() {
-        let compound =
-            matches!(c, '-' | RANGE) && letter && rest.peek().is_some_and(|c| c.is_alphabetic());
-        folded.push(if compound { ' ' } else { lower(c) });
-        letter = c.is_alphabetic();
+        let is_compound = matches!(c, '-' | RANGE)
+            && follows_letter
+            && rest.peek().is_some_and(|c| c.is_alphabetic());
+        folded.push(if is_compound { ' ' } else { lower(c) });
+        follows_letter = c.is_alphabetic();
     }
     if folded.contains("grey") {
         folded = folded.replace("grey", "gray");
     }
     folded
+}
+
+/// The lower case of a character if it has the same number of bytes; otherwise the character itself.
+fn lower(c: char) -> char {
+    if c.is_ascii() {
+        return c.to_ascii_lowercase();
+    }
+    let mut lower = c.to_lowercase();
+    match (lower.next(), lower.next()) {
+        (Some(l), None) if l.len_utf8() == c.len_utf8() => l,
+        _ => c,
+    }
 }

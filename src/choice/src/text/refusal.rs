@@ -1,4 +1,4 @@
-//! Recognition of replies that decline to answer. It only decides the reason why nothing was read.
+//! Recognition of replies that decline to answer. It decides only the reason that is reported for an unread reply.
 
 use std::sync::LazyLock;
 

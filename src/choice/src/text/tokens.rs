@@ -1,11 +1,11 @@
 //! The words and signs of a text: [`tokens`].
 
-use crate::names::unspaced;
+use crate::names::is_unspaced;
 
 /// The kind of a token.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum TokenKind {
-    /// A word or a number; in a script without spaces, a character.
+    /// A word or a number; in a script without spaces between words, a single character.
     Word,
     /// Any other character that is not a space.
     Sign,
@@ -24,19 +24,19 @@ pub(crate) struct Token {
 }
 
 impl Token {
-    /// The token's characters in the text that it comes from.
+    /// The token's part of the text.
     pub(crate) fn slice<'a>(&self, text: &'a str) -> &'a str {
         &text[self.start..self.end]
     }
 
-    /// Whether the token is this sign.
+    /// True if the token is one of these signs.
     pub(crate) fn is_sign(&self, text: &str, signs: &[char]) -> bool {
         self.kind == TokenKind::Sign && self.slice(text).starts_with(signs)
     }
 }
 
-/// Every token of a text, from left to right. An apostrophe inside a word belongs to it, and so does a point or a comma
-/// between digits ("2.5") or a point of an abbreviation ("e.g.").
+/// Every token of a text, from left to right. An apostrophe inside a word belongs to the word, as do a full stop or comma between
+/// digits ("2.5") and the full stops of an abbreviation ("e.g.").
 pub(crate) fn tokens(text: &str) -> Vec<Token> {
     let mut tokens: Vec<Token> = Vec::with_capacity(text.len() / 4);
     let mut previous = ' ';
@@ -46,7 +46,7 @@ pub(crate) fn tokens(text: &str) -> Vec<Token> {
             .last_mut()
             .filter(|last| last.end == start && last.kind == TokenKind::Word);
         match last {
-            Some(last) if joins(text, last, previous, c, end) => last.end = end,
+            Some(last) if continues_token(text, last, previous, c, end) => last.end = end,
             _ if c == '\n' => tokens.push(Token {
                 start,
                 end,
@@ -69,26 +69,29 @@ pub(crate) fn tokens(text: &str) -> Vec<Token> {
     tokens
 }
 
-/// Whether a character that ends at byte `end` belongs to the word before it.
-fn joins(text: &str, word: &Token, previous: char, c: char, end: usize) -> bool {
+/// True if a character that ends at byte `end` continues the word before it.
+fn continues_token(text: &str, word: &Token, previous: char, c: char, end: usize) -> bool {
     if !matches!(c, '\'' | ',' | '.') {
-        return spelled(c) && (spelled(previous) || matches!(previous, '\'' | '.' | ','));
+        return is_spaced_word_char(c)
+            && (is_spaced_word_char(previous) || matches!(previous, '\'' | '.' | ','));
     }
     let mut after = text[end..].chars();
     let (next, second) = (after.next().unwrap_or(' '), after.next().unwrap_or(' '));
     match c {
-        '\'' => spelled(previous) && spelled(next),
+        '\'' => is_spaced_word_char(previous) && is_spaced_word_char(next),
         _ if previous.is_numeric() => next.is_numeric(),
         ',' => false,
         _ => {
             let letters = word.slice(text);
-            let begins = letters.len() == 1 && next.is_alphabetic() && !second.is_alphabetic();
-            begins || (letters.len() <= 5 && letters.contains('.') && !next.is_alphanumeric())
+            let begins_abbreviation =
+                letters.len() == 1 && next.is_alphabetic() && !second.is_alphabetic();
+            begins_abbreviation
+                || (letters.len() <= 5 && letters.contains('.') && !next.is_alphanumeric())
         }
     }
 }
 
-/// Whether a character is part of a word of a script that writes spaces.
-fn spelled(c: char) -> bool {
-    c.is_ascii_alphanumeric() || ((c.is_alphanumeric() || c == '_') && !unspaced(c))
+/// True if a character is part of a word in a script with spaces between words.
+fn is_spaced_word_char(c: char) -> bool {
+    c.is_ascii_alphanumeric() || ((c.is_alphanumeric() || c == '_') && !is_unspaced(c))
 }

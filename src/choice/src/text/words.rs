@@ -13,27 +13,30 @@ use super::tokens::{Token, TokenKind, tokens};
 /// The lists of words and phrases.
 const WORDS: &str = include_str!("../words.toml");
 
-/// Function of a phrase in a reply. Each has a list in `words.toml`, which explains it.
+/// Function of a phrase in a reply. `words.toml` has a list of phrases for each role.
+///
+/// "Excluding" a name leaves the answer among the other choices. "Denying" a name keeps it as a rival: another choice is then
+/// ambiguous.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Role {
-    /// Takes the names behind it out of the running.
+    /// Excludes the names after it.
     Exclude,
-    /// As a predicate, takes the names before it out of the running.
+    /// As a predicate, excludes the names before it.
     Excluded,
-    /// As `Excluded`, at the end of a clause alone.
+    /// As `Excluded`, but only at the end of a clause.
     ExcludedLast,
     /// Excludes together with a [`Role::Candidate`].
     Untrue,
-    /// A word for a choice, as "option".
+    /// A word for a choice, such as "option".
     Candidate,
-    /// Denies the names behind it, which stay in the way.
+    /// Denies the names after it.
     Not,
-    /// Denies the name directly before it, which stays in the way.
+    /// Denies the name directly before it.
     NotBehind,
-    /// As a predicate, denies the name directly before it, which stays in the way.
+    /// As a predicate, denies the name directly before it.
     Absent,
-    /// Looks like a denial or a boundary, and is none.
+    /// Looks like a denial or a boundary but is neither.
     Neutral,
     /// Ends the reach of denials.
     Cut,
@@ -41,7 +44,7 @@ pub(crate) enum Role {
     Subordinate,
     /// Joins a letter and a text that mean the same.
     Apposition,
-    /// Begins a clause of its own after a comma.
+    /// Begins an independent clause after a comma.
     Assertion,
     /// A verb before a predicate.
     Copula,
@@ -49,9 +52,9 @@ pub(crate) enum Role {
     Modal,
     /// A word between a verb and its predicate.
     Adverb,
-    /// Announces the choices that are left over.
+    /// Announces the remaining choices.
     Leaves,
-    /// Follows a name and marks it as the remainder.
+    /// Marks the name before it as the only one that remains.
     Remains,
     /// Joins alternatives.
     Or,
@@ -67,27 +70,27 @@ pub(crate) enum Role {
     Condition,
     /// A preposition of [`Role::Better`] light.
     Given,
-    /// More than there is, before a [`Role::LightNoun`].
+    /// A comparative such as "more", before a [`Role::LightNoun`].
     Better,
     /// Light, or an image.
     LightNoun,
     /// Begins a condition at the start of a clause.
     Inverted,
-    /// Says that what stands before it is described.
+    /// Marks the words before it as a description of expectations.
     Expected,
-    /// A condition that only makes the model choose.
+    /// A condition that only forces a choice, as "if I had to guess".
     Forced,
     /// Retracts an earlier statement.
     Retraction,
     /// A word between "or" and a name.
     Hedge,
-    /// "No" in a phrase that answers nothing.
+    /// "No" in a phrase that is not an answer.
     NoIdiom,
     /// Begins a clause.
     ClauseStart,
-    /// A preposition behind a "no" that answers.
+    /// A preposition after a "no" that is an answer.
     Preposition,
-    /// A noun that makes another thing of the name before it.
+    /// A noun that the name before it modifies, as "lamp" in "table lamp".
     Head,
     /// A color.
     Color,
@@ -101,13 +104,13 @@ pub(crate) enum Role {
     Image,
     /// A subject that may mean the image.
     Pronoun,
-    /// Makes a pronoun mean the image.
+    /// Makes a pronoun refer to the image.
     Entirely,
-    /// Says that nothing but a color is seen.
+    /// A phrase that only a color is seen.
     See,
     /// A noun that makes a color before it a property of the image.
     Noise,
-    /// A preposition before an image noun that is no subject.
+    /// A preposition before an image noun that is not the subject.
     Within,
     /// A part of the image.
     Portion,
@@ -123,30 +126,31 @@ impl Roles {
         Self(1 << role as u64)
     }
 
-    /// Whether the set has this role.
+    /// True if the set contains this role.
     pub(crate) const fn has(self, role: Role) -> bool {
         self.0 & (1 << role as u64) != 0
     }
 
-    /// Whether the set has any of these roles.
+    /// True if the set contains any of these roles.
     pub(crate) fn has_any(self, roles: &[Role]) -> bool {
         roles.iter().any(|role| self.has(*role))
     }
 
     /// The roles that are in either set.
-    pub(super) const fn with(self, other: Self) -> Self {
+    pub(super) const fn union(self, other: Self) -> Self {
         Self(self.0 | other.0)
     }
 
     /// The roles that are in both sets.
-    pub(super) const fn both(self, other: Self) -> Self {
+    pub(super) const fn intersection(self, other: Self) -> Self {
         Self(self.0 & other.0)
     }
 }
 
-/// One phrase: the words after its first one, and its role.
+/// One phrase of the vocabulary.
 #[derive(Debug)]
 struct Phrase {
+    /// The words after the first one.
     rest: Vec<String>,
     roles: Roles,
 }
@@ -161,7 +165,7 @@ static PHRASES: LazyLock<HashMap<String, Vec<Phrase>>> = LazyLock::new(|| {
             let rest: Vec<String> = words.collect();
             let same_start = phrases.entry(first).or_default();
             match same_start.iter_mut().find(|phrase| phrase.rest == rest) {
-                Some(known) => known.roles = known.roles.with(Roles::from_role(role)),
+                Some(known) => known.roles = known.roles.union(Roles::from_role(role)),
                 None => same_start.push(Phrase {
                     rest,
                     roles: Roles::from_role(role),
@@ -178,24 +182,23 @@ static PHRASES: LazyLock<HashMap<String, Vec<Phrase>>> = LazyLock::new(|| {
 /// The lists of `words.toml`.
 #[expect(
     clippy::expect_used,
-    reason = "a file of this program, which the tests read"
+    reason = "the file is compiled in and parsed by the tests"
 )]
 pub(crate) fn lists() -> BTreeMap<Role, Vec<String>> {
     toml::from_str(WORDS).expect("words.toml has the lists of `Role`")
 }
 
-/// The words of a phrase, as they are cut in a reply.
+/// The words of a phrase, tokenized like a reply.
 fn words_of(phrase: &str) -> Vec<String> {
     let folded = fold(phrase);
-    let words = tokens(&folded);
-    words
+    tokens(&folded)
         .iter()
         .map(|word| word.slice(&folded).to_owned())
         .collect()
 }
 
-/// The longest phrase that begins with the first of these tokens: its number of tokens, and its roles. A contraction with
-/// "not" is [`Role::Not`] if it is not in the lists.
+/// The longest phrase that begins with the first of these tokens: its number of tokens and its roles. An unlisted contraction with
+/// "not" is [`Role::Not`].
 pub(crate) fn phrase_at(folded: &str, tokens: &[Token]) -> Option<(usize, Roles)> {
     let first = tokens
         .first()
@@ -209,9 +212,9 @@ pub(crate) fn phrase_at(folded: &str, tokens: &[Token]) -> Option<(usize, Roles)
                 .zip(&tokens[1..])
                 .all(|(word, token)| token.slice(folded) == word)
     });
-    let contraction =
-        || (word.ends_with("n't") && word.len() > 3).then_some((1, Roles::from_role(Role::Not)));
-    listed
-        .map(|phrase| (phrase.rest.len() + 1, phrase.roles))
-        .or_else(contraction)
+    match listed {
+        Some(phrase) => Some((phrase.rest.len() + 1, phrase.roles)),
+        None if word.ends_with("n't") && word.len() > 3 => Some((1, Roles::from_role(Role::Not))),
+        None => None,
+    }
 }

@@ -6,7 +6,7 @@ use super::*;
 use crate::cli::Cli;
 use crate::types::flags::KEYED_FLAGS;
 
-/// The sample values of all keys of an evaluation by their hidden flags, and the words that set the same by keyed flags.
+/// Sets each key of an evaluation by its hidden flag and by its keyed flag, and compares the two.
 #[test]
 fn a_keyed_flag_sets_what_the_hidden_flags_set() {
     let mut all = Cli::command();
@@ -95,7 +95,7 @@ fn a_key_of_one_value_needs_none() {
 
 #[test]
 fn errors_of_keys_name_the_keyed_flag() {
-    for (words, file, says) in [
+    for (words, file, part) in [
         (
             &["--noise", "gian=3"][..],
             "",
@@ -149,7 +149,7 @@ fn errors_of_keys_name_the_keyed_flag() {
         ),
     ] {
         let error = parsed(words, &[], file).unwrap_err();
-        assert!(error.contains(says), "{says}: {error}");
+        assert!(error.contains(part), "{part}: {error}");
         assert_eq!(error.lines().count(), 1, "{error}");
     }
 }

@@ -296,7 +296,7 @@ impl ColumnFormat {
     /// If the answer does not identify an option, or the options are not valid choices.
     fn choices(&self, answer: &str, options: &OptionList) -> Result<Choices, String> {
         match self.choice_index(answer, options) {
-            Some(truth) => Choices::known_by(Arc::clone(&options.texts), Some(truth))
+            Some(truth) => Choices::with_truth(Arc::clone(&options.texts), Some(truth))
                 .map_err(|e| e.to_string()),
             None => Err(format!(
                 "the answer {:?} is not one of the options {} (read as {}, which fits {} rows)",
@@ -380,7 +380,7 @@ fn answer_without_options(
             None
         };
         let truth = digit.or_else(|| yes_no_index(&answer));
-        match Choices::known_by(Arc::clone(&yes_and_no), truth) {
+        match Choices::with_truth(Arc::clone(&yes_and_no), truth) {
             Ok(choices) if choices.truth().is_some() => {
                 count += 1;
                 truths.questions.push(ParsedQuestion { row, text, choices });

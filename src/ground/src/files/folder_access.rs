@@ -1,4 +1,4 @@
-//! Who may enter a folder that the program makes: [`FolderAccess`].
+//! Access rights of the folders that the program creates: [`FolderAccess`].
 
 use std::path::Path;
 use std::{fs, io};
@@ -8,8 +8,8 @@ use crate::error::{Error, Result};
 /// The access of other users of this machine to a new folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum FolderAccess {
-    /// None: the folder holds replies, and pictures of homes. As nobody else can enter it, all that is in it is private, whatever the
-    /// modes of the files are; so `chmod` of the folder alone shares it later.
+    /// No access, because a run contains replies and pictures of homes. Nobody else can enter the folder, so its files are private
+    /// whatever their modes are, and `chmod` of the folder alone shares them later.
     #[default]
     Private,
     /// The system's default for new folders (`umask`).
@@ -26,19 +26,20 @@ impl FolderAccess {
         }
     }
 
-    /// Creates a folder; those above it have the mode that the system gives. One that exists keeps its mode.
+    /// Creates a folder. Missing parents get the system's default mode; an existing folder keeps its mode.
     ///
     /// # Errors
     /// If it cannot be created.
     pub fn create(self, path: &Path) -> Result<()> {
-        self.make(path).map_err(|e| Error::file(path, "create", e))
+        self.create_io(path)
+            .map_err(|e| Error::file(path, "create", e))
     }
 
-    /// Creates a folder as [`create`](Self::create), with the error of the system.
+    /// Creates a folder as [`create`](Self::create) does, but returns the bare error of the operating system.
     ///
     /// # Errors
     /// If it cannot be created.
-    pub fn make(self, path: &Path) -> io::Result<()> {
+    pub fn create_io(self, path: &Path) -> io::Result<()> {
         if let Some(above) = path.parent() {
             fs::create_dir_all(above)?;
         }
@@ -61,21 +62,22 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_new_folder_is_private_and_an_old_one_stays() {
-        let scene = tempfile::tempdir().unwrap();
-        let mode = |name: &str| {
-            let data = fs::metadata(scene.path().join(name)).unwrap();
-            data.permissions().mode() & 0o777
-        };
-        let create = |name: &str, access: FolderAccess| access.create(&scene.path().join(name));
-        create("runs/a", FolderAccess::Private).unwrap();
-        assert_eq!(mode("runs/a"), 0o700);
-        create("runs/b", FolderAccess::Shared).unwrap();
-        // Whatever the system gives here, both have it.
-        assert_eq!(mode("runs/b"), mode("runs"));
-        create("runs", FolderAccess::Private).unwrap();
-        assert_eq!(mode("runs/b"), mode("runs"));
-        fs::write(scene.path().join("file"), "").unwrap();
-        assert!(create("file", FolderAccess::Private).is_err());
+    fn only_new_private_folders_get_a_mode() {
+        let folder = tempfile::tempdir().unwrap();
+        let [runs, private, shared, file] =
+            ["runs", "runs/a", "runs/b", "file"].map(|name| folder.path().join(name));
+        FolderAccess::Private.create(&private).unwrap();
+        assert_eq!(mode(&private), 0o700);
+        FolderAccess::Shared.create(&shared).unwrap();
+        // Both have the system's default mode.
+        assert_eq!(mode(&shared), mode(&runs));
+        FolderAccess::Private.create(&runs).unwrap();
+        assert_eq!(mode(&shared), mode(&runs));
+        fs::write(&file, "").unwrap();
+        assert!(FolderAccess::Private.create(&file).is_err());
+    }
+
+    fn mode(path: &Path) -> u32 {
+        fs::metadata(path).unwrap().permissions().mode() & 0o777
     }
 }

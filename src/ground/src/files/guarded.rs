@@ -1,6 +1,6 @@
-//! Decoders of libraries, whose panics are errors: [`guarded`].
+//! Calls of third-party decoders whose panics become errors: [`guarded`].
 //!
-//! A decoder should refuse every broken file. Some break down instead: the OpenEXR decoder on a few damaged blocks of lossy
+//! A decoder should return an error for every broken file. Some panic instead: the OpenEXR decoder on a few damaged blocks of lossy
 //! compression (found by mutated files). One file must not end a run.
 
 use std::cell::Cell;
@@ -12,7 +12,8 @@ thread_local! {
     static GUARDED: Cell<bool> = const { Cell::new(false) };
 }
 
-/// The result of a decoder; an error if it panics. Nothing that it worked on is used afterwards.
+/// Runs a decoder and returns its result, or an error if it panics. Callers use nothing that the decoder worked on
+/// after a panic.
 pub fn guarded<T>(decode: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {

@@ -14,7 +14,7 @@ use crate::error::{Error, Result};
 /// The ending of a file's name until the file is complete.
 pub const UNFINISHED: &str = ".part";
 
-/// Writes a file that can be made again: a killed process leaves the old or the new one, a power cut may lose both.
+/// Writes a file that can be regenerated: a killed process leaves the old or the new content, a power cut may lose both.
 ///
 /// # Errors
 /// If the folder cannot be created or the file cannot be written.
@@ -30,32 +30,33 @@ pub fn write_synced(path: &Path, content: &[u8]) -> Result<()> {
     replace(path, content, File::sync_all)
 }
 
-/// True for the name of an unfinished file, as a killed process leaves one behind.
+/// True for the name of an unfinished file, which a killed process may leave behind.
 pub fn is_unfinished(name: &OsStr) -> bool {
     name.to_string_lossy().ends_with(UNFINISHED)
 }
 
-/// Writes a file by `write`, and forces it to the disk before it returns. A file with the same content is left untouched.
+/// Writes a file through `write`, and forces it to the disk before it returns. A file with the same content is left untouched.
 ///
 /// # Errors
 /// If the folder cannot be created, the file cannot be written, or `write` fails.
 pub fn write_with(path: &Path, write: impl FnOnce(&mut dyn io::Write) -> Result<()>) -> Result<()> {
     create_folder(path)?;
     let unfinished = unfinished(path);
-    let unwritable = |e| Error::file(&unfinished, "write", e);
-    let mut file = BufWriter::new(create_new(&unfinished).map_err(unwritable)?);
+    let mut file = create_new(&unfinished)
+        .map(BufWriter::new)
+        .map_err(|e| Error::file(&unfinished, "write", e))?;
     write(&mut file)?;
-    file.flush().map_err(unwritable)?;
-    file.get_ref().sync_all().map_err(unwritable)?;
+    file.flush()
+        .and_then(|()| file.get_ref().sync_all())
+        .map_err(|e| Error::file(&unfinished, "write", e))?;
     drop(file);
-    if is_same(path, &unfinished).unwrap_or(false) {
-        return fs::remove_file(&unfinished).map_err(unwritable);
+    if has_same_content(path, &unfinished).unwrap_or(false) {
+        return fs::remove_file(&unfinished).map_err(|e| Error::file(&unfinished, "write", e));
     }
     fs::rename(&unfinished, path).map_err(|e| Error::file(path, "write", e))
 }
 
-/// Whether two files have the same content.
-fn is_same(one: &Path, other: &Path) -> io::Result<bool> {
+fn has_same_content(one: &Path, other: &Path) -> io::Result<bool> {
     if fs::metadata(one)?.len() != fs::metadata(other)?.len() {
         return Ok(false);
     }
@@ -77,16 +78,16 @@ fn is_same(one: &Path, other: &Path) -> io::Result<bool> {
     }
 }
 
-/// The path of a file until it is complete.
+/// The temporary path of a file until it is complete: a hidden file in the same folder.
 pub fn unfinished(path: &Path) -> PathBuf {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     path.with_file_name(format!(".{name}{UNFINISHED}"))
 }
 
-/// Creates an empty file and replaces a leftover of a killed process. A link at the path is replaced, not followed.
+/// Creates an empty file, in place of a file that a killed process left there. A link at the path is replaced, not followed.
 ///
 /// # Errors
-/// If a folder is there, or the file cannot be created.
+/// If the path is a folder, or the file cannot be created.
 pub fn create_new(path: &Path) -> io::Result<File> {
     match fs::remove_file(path) {
         Err(e) if e.kind() != io::ErrorKind::NotFound => return Err(e),
@@ -121,7 +122,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_link_in_the_place_of_a_new_file_is_replaced() {
+    fn links_are_replaced_not_followed() {
         let folder = tempfile::tempdir().unwrap();
         let [private, link] = ["private", "new.part"].map(|name| folder.path().join(name));
         fs::write(&private, "private").unwrap();

@@ -1,7 +1,8 @@
-//! Readers of folders ([`entries`]), files ([`open`]), text files ([`text`], [`settings`]) and files of one JSON object a line ([`json_lines`]).
+//! Readers of folders ([`entries`]), files ([`open`]), text files ([`text`], [`settings`]) and files of one JSON object a line
+//! ([`json_lines`]).
 //!
-//! Each has a bound, so that no file takes memory without end, and none waits for ever: a stranger's file may be a link to `/dev/zero`,
-//! or a pipe.
+//! Each reader has a size limit and refuses pipes and devices: a downloaded data set may contain a link to `/dev/zero`, which would fill
+//! the memory, or a pipe, which would block for ever.
 
 use std::fs::{self, File};
 use std::io::{self, BufRead as _, BufReader, Read as _};
@@ -11,25 +12,27 @@ use serde::de::DeserializeOwned;
 
 use crate::error::{Error, Result};
 
-/// The most bytes of a file of settings. Chosen: people write a few kilobytes.
-const MOST_SETTINGS: u64 = 1 << 20;
+/// Size limit of a settings file, in bytes. Chosen: people write a few kilobytes.
+const MAX_SETTINGS_BYTES: u64 = 1 << 20;
 
-/// The most bytes of a line of text. Chosen: a question with its choices has less than a kilobyte.
-const MOST_LINE: u64 = 4 << 20;
+/// Size limit of one line of JSON, in bytes. Chosen: a question with its choices has less than a kilobyte.
+const MAX_LINE_BYTES: u64 = 4 << 20;
 
-/// The most bytes of any other file that is read at once. Chosen: the largest published lists of questions have a tenth.
-const MOST_BYTES: u64 = 1 << 30;
+/// Size limit of any other file that is read at once, in bytes. Chosen: the largest published lists of questions have a tenth of it.
+const MAX_BYTES: u64 = 1 << 30;
 
 /// The paths in a folder, sorted by name.
 ///
 /// # Errors
 /// If the folder cannot be read.
 pub fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
-    let unreadable = |e| Error::file(folder, "read", e);
-    let entries = fs::read_dir(folder).map_err(unreadable)?;
-    let mut paths = entries
-        .map(|entry| entry.map(|entry| entry.path()).map_err(unreadable))
-        .collect::<Result<Vec<PathBuf>>>()?;
+    let mut paths = fs::read_dir(folder)
+        .and_then(|entries| {
+            entries
+                .map(|entry| entry.map(|entry| entry.path()))
+                .collect::<io::Result<Vec<PathBuf>>>()
+        })
+        .map_err(|e| Error::file(folder, "read", e))?;
     paths.sort();
     Ok(paths)
 }
@@ -44,10 +47,10 @@ pub fn open(path: &Path) -> io::Result<File> {
     File::open(path)
 }
 
-/// Refuses what [`open`] refuses, before a file is opened in another way.
+/// Checks a path as [`open`] does, for callers that open the file in another way.
 ///
 /// # Errors
-/// If there is a pipe or a device, or nothing.
+/// If the path is a pipe or a device, or does not exist.
 pub fn refuse_pipes(path: &Path) -> io::Result<()> {
     let kind = fs::metadata(path)?.file_type();
     let is_named = path.starts_with("/dev") || path.starts_with("/proc");
@@ -63,7 +66,7 @@ pub fn refuse_pipes(path: &Path) -> io::Result<()> {
 /// # Errors
 /// If the file cannot be read, or is larger than 1 GB.
 pub fn read(path: &Path) -> io::Result<Vec<u8>> {
-    read_at_most(path, MOST_BYTES)
+    read_at_most(path, MAX_BYTES)
 }
 
 /// The text of a file that [`open`] opens.
@@ -77,19 +80,20 @@ pub fn read_to_string(path: &Path) -> io::Result<String> {
 fn read_at_most(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     let file = open(path)?;
     let length = file.metadata()?.len();
-    let too_large = || {
-        let problem = format!("larger than {most} bytes, which no file of its kind needs");
-        io::Error::new(io::ErrorKind::InvalidData, problem)
-    };
-    // A sparse file takes no room on the disk, and would take it all in memory.
+    // The length is checked before memory is reserved: a sparse file takes little room on the disk but all of it in memory.
     if length > most {
-        return Err(too_large());
+        return Err(too_large(most));
     }
     let mut bytes = Vec::with_capacity(length as usize);
     if file.take(most + 1).read_to_end(&mut bytes)? as u64 > most {
-        return Err(too_large());
+        return Err(too_large(most));
     }
     Ok(bytes)
+}
+
+fn too_large(most: u64) -> io::Error {
+    let problem = format!("larger than {most} bytes, which no file of its kind needs");
+    io::Error::new(io::ErrorKind::InvalidData, problem)
 }
 
 fn utf8(bytes: Vec<u8>) -> io::Result<String> {
@@ -101,7 +105,7 @@ fn utf8(bytes: Vec<u8>) -> io::Result<String> {
 /// # Errors
 /// If the file cannot be read, or is larger than 1 GB.
 pub fn bytes(path: &Path) -> Result<Vec<u8>> {
-    at_most(path, MOST_BYTES)
+    at_most(path, MAX_BYTES)
 }
 
 /// The text of a file.
@@ -112,12 +116,12 @@ pub fn text(path: &Path) -> Result<String> {
     read_to_string(path).map_err(|e| Error::file(path, "read", e))
 }
 
-/// The text of a file of settings.
+/// The text of a settings file.
 ///
 /// # Errors
 /// If the file cannot be read, is larger than 1 MB, or is not UTF-8.
 pub fn settings(path: &Path) -> Result<String> {
-    read_at_most(path, MOST_SETTINGS)
+    read_at_most(path, MAX_SETTINGS_BYTES)
         .and_then(utf8)
         .map_err(|e| Error::file(path, "read", e))
 }
@@ -143,17 +147,22 @@ pub fn json<T: DeserializeOwned>(path: &Path) -> Result<T> {
 /// # Errors
 /// If the file cannot be read, or a line is longer than 4 MB or does not hold such an object; the error names the line.
 pub fn json_lines<T: DeserializeOwned>(path: &Path) -> Result<Vec<(usize, T)>> {
-    let unreadable = |e| Error::file(path, "read", e);
-    let mut file = BufReader::new(open(path).map_err(unreadable)?);
+    let mut file = open(path)
+        .map(BufReader::new)
+        .map_err(|e| Error::file(path, "read", e))?;
     let (mut values, mut line) = (Vec::new(), Vec::new());
     for number in 1.. {
         line.clear();
-        let read = (&mut file).take(MOST_LINE + 1).read_until(b'\n', &mut line);
-        if read.map_err(unreadable)? == 0 {
+        let read = (&mut file)
+            .take(MAX_LINE_BYTES + 1)
+            .read_until(b'\n', &mut line)
+            .map_err(|e| Error::file(path, "read", e))?;
+        if read == 0 {
             break;
         }
-        if line.len() as u64 > MOST_LINE {
-            let problem = format!("longer than {MOST_LINE} bytes, which no line of its kind needs");
+        if line.len() as u64 > MAX_LINE_BYTES {
+            let problem =
+                format!("longer than {MAX_LINE_BYTES} bytes, which no line of its kind needs");
             return Err(Error::line(path, number, problem));
         }
         let text = match number {
@@ -161,11 +170,9 @@ pub fn json_lines<T: DeserializeOwned>(path: &Path) -> Result<Vec<(usize, T)>> {
             _ => &line[..],
         };
         if !text.trim_ascii().is_empty() {
-            let value = serde_json::from_slice(text.trim_ascii_end());
-            values.push((
-                number,
-                value.map_err(|e| Error::json_line(path, number, &e))?,
-            ));
+            let value = serde_json::from_slice(text.trim_ascii_end())
+                .map_err(|e| Error::json_line(path, number, &e))?;
+            values.push((number, value));
         }
     }
     Ok(values)
@@ -176,10 +183,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_too_large_is_refused_by_name() {
+    fn errors_name_the_file_and_its_limit() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("list.jsonl");
-        let text = format!("\u{feff}1\n\n  2 \r\n{}3\n", " ".repeat(MOST_LINE as usize));
+        let text = format!(
+            "\u{feff}1\n\n  2 \r\n{}3\n",
+            " ".repeat(MAX_LINE_BYTES as usize)
+        );
         fs::write(&path, &text).unwrap();
         let error = json_lines::<u8>(&path).unwrap_err().to_string();
         assert!(
@@ -189,20 +199,14 @@ mod tests {
         fs::write(&path, text.trim_end_matches(['3', '\n', ' '])).unwrap();
         assert_eq!(json_lines::<u8>(&path).unwrap(), [(1, 1), (3, 2)]);
         assert!(settings(&path).is_ok());
-        fs::write(&path, vec![b' '; 1 + MOST_SETTINGS as usize]).unwrap();
+        fs::write(&path, vec![b' '; 1 + MAX_SETTINGS_BYTES as usize]).unwrap();
         let error = settings(&path).unwrap_err().to_string();
         assert!(
             error.contains("list.jsonl") && error.contains("larger than 1048576 bytes"),
             "{error}"
         );
-        assert!(text_of_bytes(&path, b"\xff").contains("UTF-8"));
-    }
-
-    fn text_of_bytes(path: &Path, bytes: &[u8]) -> String {
-        fs::write(path, bytes).unwrap();
-        text(path)
-            .unwrap_err()
-            .to_string()
-            .replace("utf-8", "UTF-8")
+        fs::write(&path, b"\xff").unwrap();
+        let error = super::text(&path).unwrap_err().to_string();
+        assert!(error.to_lowercase().contains("utf-8"), "{error}");
     }
 }

@@ -77,7 +77,7 @@ struct ClassEntry {
     id: u16,
     name: String,
     canonical: String,
-    /// Whether absence of the canonical class from a map means that the image shows no such object.
+    /// True if an image whose map lacks the canonical class shows no object of it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     expressible: Option<bool>,
 }
@@ -201,36 +201,26 @@ mod tests {
     }
 
     #[test]
-    fn a_file_without_expressible_marks_is_read_by_its_space() {
-        let class = |id: u16, canonical: &str, more: &str| {
-            format!(r#"{{"id":{id},"name":"x","canonical":"{canonical}"{more}}}"#)
-        };
-        let file = |space: &str, classes: &[String]| {
-            format!(
-                r#"{{"schema":"{SCHEMA}","space":"{space}","void_id":0,"classes":[{}]}}"#,
-                classes.join(",")
-            )
-        };
-        let bare = [class(24, "appliances", ""), class(5, "chair", "")];
-        let read = |text: &str| {
-            parse(text)
-                .unwrap()
-                .expressible
-                .into_iter()
-                .collect::<Vec<_>>()
-        };
-        assert_eq!(read(&file("nyu40", &bare)), ["chair"]);
-        assert_eq!(read(&file("mine", &bare)), ["appliances", "chair"]);
-        let marked = [
-            class(24, "appliances", r#","expressible":true"#),
-            class(5, "chair", ""),
-        ];
-        assert_eq!(read(&file("nyu40", &marked)), ["appliances"]);
+    fn built_in_space_decides_without_expressible_marks() {
+        assert_eq!(expressible("nyu40", ""), ["chair"]);
+        assert_eq!(expressible("mine", ""), ["appliances", "chair"]);
+        let mark = r#","expressible":true"#;
+        assert_eq!(expressible("nyu40", mark), ["appliances"]);
+    }
+
+    /// The expressible classes of a file with the classes `appliances`, with `mark`, and `chair`, without a mark.
+    fn expressible(space: &str, mark: &str) -> Vec<String> {
+        let text = format!(
+            r#"{{"schema":"{SCHEMA}","space":"{space}","void_id":0,"classes":[
+                {{"id":24,"name":"x","canonical":"appliances"{mark}}},
+                {{"id":5,"name":"x","canonical":"chair"}}]}}"#
+        );
+        parse(&text).unwrap().expressible.into_iter().collect()
     }
 
     #[test]
-    fn a_broken_file_says_what_is_wrong() {
-        for (text, says) in [
+    fn errors_name_the_fault() {
+        for (text, problem) in [
             ("{", "EOF"),
             (r#"{"schema":"x","space":"","classes":[]}"#, "schema \"x\""),
             (
@@ -243,7 +233,7 @@ mod tests {
             ),
         ] {
             let error = parse(text).unwrap_err().to_string();
-            assert!(error.contains(says), "{error}");
+            assert!(error.contains(problem), "{error}");
         }
     }
 }

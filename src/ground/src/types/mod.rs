@@ -1,5 +1,4 @@
-//! The types that all rooms share, without input or output. The only arithmetic on pixels is how more than 8 bits are shown;
-//! [`images::Isa`] names the instruction sets that loops over pixels are compiled for.
+//! Types shared by all crates of the workspace, without input or output.
 
 pub mod degradations;
 pub mod flags;
@@ -74,7 +73,7 @@ mod tests {
                 let reading = reading
                     .filter(|_| kind.has_readings())
                     .map(|name| ReadingName::new(&name).unwrap());
-                Degradation::new(kind, Severity::hundredths(severity), reading).unwrap()
+                Degradation::new(kind, Severity::from_hundredths(severity), reading).unwrap()
             }),
         )
     }
@@ -91,7 +90,7 @@ mod tests {
 
         #[test]
         fn labels_read_back_in_order(one in 1..=1600_u16, other in 1..=1600_u16) {
-            let severities = [one, other].map(Severity::hundredths);
+            let severities = [one, other].map(Severity::from_hundredths);
             for (kind, severity) in Kind::ALL.into_iter().zip(severities) {
                 prop_assert_eq!(kind.severity(&kind.label(severity)).unwrap(), severity);
             }

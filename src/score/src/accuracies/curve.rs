@@ -71,7 +71,10 @@ impl CurvePoints {
                     && subject.model == model
                     && (subject.level == Some(AxisLevel::L0)
                         && subject.enhancer.is_none()
-                        && RunGroup::meet(subject.variant.group.as_ref(), variant.group.as_ref())
+                        && RunGroup::overlap(
+                            subject.variant.group.as_ref(),
+                            variant.group.as_ref(),
+                        )
                         || subject.variant == *variant && subject.enhancer.as_ref() == enhancer)
             };
             let mut subjects: Vec<(AxisLevel, usize)> = grid

@@ -41,7 +41,7 @@ impl Detail for ChoiceDetail {
             // A person pressed the button for it, so there is no text to parse again.
             return Ok(());
         }
-        let choices = Choices::known_by(self.choices.clone().into(), self.truth)?;
+        let choices = Choices::with_truth(self.choices.clone().into(), self.truth)?;
         let (strict, lenient) = readings(reply, &choices);
         self.outcome = match strict {
             Answer::Unparsed(_) => TrialOutcome::Unparsed,

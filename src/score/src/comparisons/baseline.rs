@@ -58,7 +58,7 @@ pub fn baseline_rows(
     let mut rows: Vec<BaselineRow> = pairs
         .iter()
         .filter_map(|&(new, old)| {
-            let image = |subject, item| grid.trial(subject, item)?.sent();
+            let image = |subject, item| grid.trial(subject, item)?.sent_digest();
             let is_other = |item| {
                 image(new, item)
                     .zip(image(old, item))

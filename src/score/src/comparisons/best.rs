@@ -430,7 +430,7 @@ impl Scores {
         };
         Some(DarkAccuracy {
             model: name.to_owned(),
-            mean: Estimate::scored(&sums, count, n)?,
+            mean: Estimate::from_scores(&sums, count, n)?,
             lighter: by_level[..split].iter().sum::<f64>() / split as f64,
             by_level,
             clean,

@@ -357,8 +357,8 @@ fn later_lights(grid: &Grid<'_>, index: usize) -> Vec<usize> {
 fn is_other_light(one: &ModelInCondition, other: &ModelInCondition) -> bool {
     (one.view, one.level) == (other.view, other.level)
         && (one.variant.kind, &one.enhancer) == (other.variant.kind, &other.enhancer)
-        && one.variant.pair.as_ref().map(PairDark::sort)
-            == other.variant.pair.as_ref().map(PairDark::sort)
+        && one.variant.pair.as_ref().map(PairDark::without_reading)
+            == other.variant.pair.as_ref().map(PairDark::without_reading)
         && one.variant != other.variant
 }
 

@@ -5,7 +5,7 @@ use crate::estimate::Estimate;
 use crate::grid::{Grid, GridItem};
 use crate::significance::{ALPHA, SwapMethod, mcnemar, swap_test};
 use darkqa_ground::types::Family;
-use darkqa_statistics::quantiles::{beyond, degrees_of_freedom, quantile};
+use darkqa_statistics::quantiles::{degrees_of_freedom, quantile, two_sided_tail};
 use darkqa_statistics::residuals::{residuals, unknown_design_effect};
 
 /// Comparison of two subjects on the items to which both replied.
@@ -199,7 +199,7 @@ impl Spread {
     /// Two-sided p-value of no difference, for an interval with this center.
     pub(super) fn p(&self, center: f64) -> f64 {
         if self.error.is_finite() {
-            beyond(center.abs() / self.error, self.degrees)
+            two_sided_tail(center.abs() / self.error, self.degrees)
         } else {
             1.0
         }

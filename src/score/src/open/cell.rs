@@ -71,6 +71,6 @@ pub(super) fn cell(
         unmarked: count(AnswerOutcome::Unmarked),
         null: count(AnswerOutcome::Null),
         cut: answers.iter().filter(|answer| answer.cut).count(),
-        score: Estimate::scored(&sums, MAX_WEIGHT, n),
+        score: Estimate::from_scores(&sums, MAX_WEIGHT, n),
     }
 }

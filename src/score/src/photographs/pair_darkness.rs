@@ -16,7 +16,7 @@ pub fn pair_facts<'g>(grid: &Grid<'g>, subject: usize) -> BTreeMap<&'g FrameId, 
         .filter_map(|item| grid.trial(subject, item))
         .filter_map(|trial| {
             let image = trial.images()?;
-            Some((trial.shown(), *image.pair.as_deref()?))
+            Some((trial.sent_frame(), *image.pair.as_deref()?))
         })
         .collect()
 }

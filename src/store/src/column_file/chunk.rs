@@ -16,11 +16,11 @@ use super::pages::Pages;
 pub(super) struct Chunk {
     writer: ColumnWriter<'static>,
     pages: Pages,
-    /// The last text: neighbouring rows mostly have the same.
+    /// The last text, which is reused because neighbouring rows often have the same text.
     last: ByteArray,
     /// The sum of the lengths of long texts, in bytes.
     pub(super) long_bytes: usize,
-    /// The number of values that are too large for the column, and null in its place.
+    /// The number of values that are too large for the column and were written as null.
     pub(super) too_large: usize,
 }
 
@@ -39,14 +39,14 @@ impl Chunk {
     /// Appends the values of these rows.
     ///
     /// # Errors
-    /// If a row has no value, or one of another type than the column.
+    /// If a value is missing or has another type than the column.
     pub(super) fn append<R>(&mut self, column: &Column<R>, rows: &[R]) -> Result<()> {
         match &mut self.writer {
             ColumnWriter::Int32ColumnWriter(writer) => {
                 let too_large = &mut self.too_large;
                 write(writer, column, rows, |cell| match cell {
                     Cell::Int(number) => {
-                        let stored = column.kind.stored(number);
+                        let stored = column.kind.to_stored(number);
                         *too_large += usize::from(stored.is_none());
                         Ok(stored)
                     }
@@ -61,7 +61,7 @@ impl Chunk {
             }
             ColumnWriter::BoolColumnWriter(writer) => {
                 write(writer, column, rows, |cell| match cell {
-                    Cell::Bool(is_so) => Ok(Some(is_so)),
+                    Cell::Bool(value) => Ok(Some(value)),
                     other => Err(other),
                 })
             }
@@ -93,14 +93,15 @@ impl Chunk {
         }
     }
 
-    /// The pages of the column, and its entry for the row group.
+    /// Closes the column and returns its pages and its entry for the row group.
     pub(super) fn close(self) -> Result<(Bytes, ColumnCloseResult)> {
         let closed = self.writer.close()?;
-        Ok((self.pages.bytes()?, closed))
+        Ok((self.pages.take_bytes()?, closed))
     }
 }
 
-/// Writes the values of these rows. `read` takes a value out of its cell: `None` is null, and an error a cell of another type.
+/// Writes the values of these rows. `read` converts a cell into a value, or `None` for null, and returns a cell of another type as an
+/// error.
 fn write<R, T: DataType>(
     writer: &mut ColumnWriterImpl<'_, T>,
     column: &Column<R>,

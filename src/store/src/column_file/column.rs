@@ -11,43 +11,43 @@ use parquet::schema::types::{Type, TypePtr};
 pub struct Column<R> {
     /// The name in the file.
     pub name: &'static str,
-    /// The type of its values.
+    /// The type of the values.
     pub kind: CellKind,
-    /// Whether each row has a value.
+    /// Whether a value may be null.
     pub presence: Presence,
-    /// The value of a row.
+    /// Returns the value of a row.
     pub value: for<'r> fn(&'r R) -> Cell<'r>,
 }
 
 /// The type of the values of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CellKind {
-    /// A text that many rows have.
+    /// A text that many rows share, such as a name.
     Text,
     /// A text of any length, which counts against the size of a row group.
     LongText,
-    /// 16 bytes that no other row has.
+    /// 16 bytes that are unique to the row.
     Key,
     /// 32 bytes.
     Digest,
-    /// A whole number of 8 bits, with its sign.
+    /// A signed integer of 8 bits.
     Int8,
-    /// A whole number of 16 bits, with its sign.
+    /// A signed integer of 16 bits.
     Int16,
-    /// A whole number of 32 bits, with its sign.
+    /// A signed integer of 32 bits.
     Int32,
-    /// A number of 64 bits with a fraction.
+    /// A floating-point number of 64 bits.
     Double,
     /// True or false.
     Bool,
 }
 
-/// Whether each row has a value.
+/// Whether a value may be null.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Presence {
-    /// A value in each row.
+    /// Every row has a value.
     Always,
-    /// Null in some rows.
+    /// Some rows may have none.
     MayBeNull,
 }
 
@@ -56,25 +56,25 @@ pub enum Presence {
 pub enum Cell<'r> {
     /// No value.
     Null,
-    /// For [`CellKind::Text`] and [`CellKind::LongText`].
+    /// A value of [`CellKind::Text`] and [`CellKind::LongText`].
     Text(Cow<'r, str>),
-    /// For [`CellKind::Key`] and [`CellKind::Digest`].
+    /// A value of [`CellKind::Key`] and [`CellKind::Digest`].
     Bytes(&'r [u8]),
-    /// For the kinds of whole numbers.
+    /// A value of the kinds of integers.
     Int(i128),
-    /// For [`CellKind::Double`].
+    /// A value of [`CellKind::Double`].
     Double(f64),
-    /// For [`CellKind::Bool`].
+    /// A value of [`CellKind::Bool`].
     Bool(bool),
 }
 
 impl<'r> Cell<'r> {
-    /// A text that the row holds; null if there is none.
+    /// A borrowed text; null for `None`.
     pub fn text(text: Option<&'r str>) -> Self {
         text.map_or(Self::Null, |text| Self::Text(text.into()))
     }
 
-    /// A whole number; null if there is none.
+    /// An integer; null for `None`.
     pub fn int<T: TryInto<i128>>(number: Option<T>) -> Self {
         number
             .and_then(|number| number.try_into().ok())
@@ -83,7 +83,7 @@ impl<'r> Cell<'r> {
 }
 
 impl CellKind {
-    /// The bits of a whole number; `None` for other kinds.
+    /// The number of bits of an integer kind; `None` for other kinds.
     fn bits(self) -> Option<u32> {
         match self {
             Self::Int8 => Some(8),
@@ -93,11 +93,10 @@ impl CellKind {
         }
     }
 
-    /// The number in the form in which it is stored; `None` if it is too large for the column.
-    pub(super) fn stored(self, number: i128) -> Option<i32> {
-        let largest = (1_i128 << (self.bits()? - 1)) - 1;
-        let fits = (-largest - 1..=largest).contains(&number);
-        fits.then_some(number as i32)
+    /// Converts a number to the stored type; `None` if it does not fit into the column.
+    pub(super) fn to_stored(self, number: i128) -> Option<i32> {
+        let max = (1_i128 << (self.bits()? - 1)) - 1;
+        (-max - 1..=max).contains(&number).then_some(number as i32)
     }
 }
 
@@ -137,7 +136,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_that_a_column_cannot_hold_are_none() {
+    fn numbers_that_do_not_fit_are_none() {
         for (kind, number, stored) in [
             (CellKind::Int8, 127, Some(127)),
             (CellKind::Int8, 128, None),
@@ -148,7 +147,7 @@ mod tests {
             (CellKind::Int32, i128::from(u64::MAX), None),
             (CellKind::Text, 1, None),
         ] {
-            assert_eq!(kind.stored(number), stored, "{kind:?} {number}");
+            assert_eq!(kind.to_stored(number), stored, "{kind:?} {number}");
         }
         assert_eq!(Cell::int(Some(u64::MAX)), Cell::Int(u64::MAX.into()));
         assert_eq!(Cell::int(None::<u8>), Cell::Null);

@@ -13,17 +13,17 @@ use darkqa_ground::files::reading;
 /// Value of `created_by` in the Parquet files of this program.
 pub const CREATED_BY: &str = concat!("darkqa-eval version ", env!("CARGO_PKG_VERSION"));
 
-/// The metadata of a file.
+/// The metadata of a Parquet file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FileMetadata {
-    /// The program that wrote it.
+    /// The program that wrote the file.
     pub created_by: String,
-    /// Values by key.
+    /// Custom metadata: values by key.
     pub pairs: BTreeMap<String, String>,
 }
 
 impl FileMetadata {
-    /// The metadata of a file; `None` if there is no such file, or if it is no whole Parquet file.
+    /// Reads the metadata of a file; `None` if the file does not exist or is not a complete Parquet file.
     ///
     /// # Errors
     /// If it cannot be read.
@@ -48,10 +48,11 @@ impl FileMetadata {
             .key_value_metadata()
             .into_iter()
             .flatten()
-            .filter_map(|pair| Some((pair.key.clone(), pair.value.clone()?)));
+            .filter_map(|pair| Some((pair.key.clone(), pair.value.clone()?)))
+            .collect();
         Ok(Some(Self {
             created_by: footer.created_by().unwrap_or_default().to_owned(),
-            pairs: pairs.collect(),
+            pairs,
         }))
     }
 }

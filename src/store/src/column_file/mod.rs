@@ -1,4 +1,4 @@
-//! A table that is written as one Parquet file, row group by row group: [`ColumnFile`].
+//! Writer of a table as a Parquet file, one row group at a time: [`ColumnFile`].
 
 mod chunk;
 mod column;
@@ -25,7 +25,7 @@ use darkqa_ground::files::{create_new, unfinished};
 pub use self::column::{Cell, CellKind, Column, Presence};
 pub use self::metadata::{CREATED_BY, FileMetadata};
 
-/// How large a row group may become, which is in memory until it ends.
+/// Size limits of a row group, which is kept in memory until it is complete.
 #[derive(Debug, Clone, Copy)]
 struct GroupLimits {
     rows: usize,
@@ -33,13 +33,13 @@ struct GroupLimits {
     long_bytes: usize,
 }
 
-/// Chosen: a million rows, as readers like them, or as many as have 256 MB of long texts.
+/// Limits of a row group: about a million rows, a common size, or 256 MiB of long texts; chosen.
 const LIMITS: GroupLimits = GroupLimits {
     rows: 1 << 20,
     long_bytes: 256 << 20,
 };
 
-/// A table whose rows are `R`. The file has its name only once it is complete.
+/// A writer of a table with rows of type `R`. The file has a temporary name until it is complete.
 pub struct ColumnFile<'c, R> {
     path: PathBuf,
     part: PathBuf,
@@ -53,23 +53,29 @@ pub struct ColumnFile<'c, R> {
 }
 
 impl<'c, R: Sync> ColumnFile<'c, R> {
-    /// Begins a file at a path, with these metadata.
+    /// Creates a file with these metadata.
     ///
     /// # Errors
     /// If it cannot be written.
     pub fn create(path: &Path, columns: &'c [Column<R>], metadata: &FileMetadata) -> Result<Self> {
         let part = unfinished(path);
         let file = create_new(&part).map_err(|e| Error::file(&part, "write", e))?;
-        let wrong = |e: ParquetError| unwritable(&part, e);
         let properties = Arc::new(properties(columns, metadata));
-        let fields: std::result::Result<Vec<_>, _> = columns.iter().map(Column::field).collect();
-        let schema = Type::group_type_builder("records")
-            .with_fields(fields.map_err(wrong)?)
-            .build()
-            .map_err(wrong)?;
-        let file = SerializedFileWriter::new(file, Arc::new(schema), Arc::clone(&properties));
+        let file = columns
+            .iter()
+            .map(Column::field)
+            .collect::<std::result::Result<Vec<_>, _>>()
+            .and_then(|fields| {
+                Type::group_type_builder("records")
+                    .with_fields(fields)
+                    .build()
+            })
+            .and_then(|schema| {
+                SerializedFileWriter::new(file, Arc::new(schema), Arc::clone(&properties))
+            })
+            .map_err(|e| unwritable(&part, e))?;
         Ok(Self {
-            file: file.map_err(wrong)?,
+            file,
             path: path.to_owned(),
             part,
             columns,
@@ -81,15 +87,18 @@ impl<'c, R: Sync> ColumnFile<'c, R> {
         })
     }
 
-    /// Appends rows, the columns on all cores.
+    /// Appends rows; the columns are written in parallel.
     ///
     /// # Errors
     /// If a row does not fit the columns, or the file cannot be written.
     pub fn append(&mut self, mut rows: &[R]) -> Result<()> {
         while !rows.is_empty() {
             if self.group.is_empty() {
-                let columns = self.file.schema_descr().columns().iter();
-                self.group = columns
+                self.group = self
+                    .file
+                    .schema_descr()
+                    .columns()
+                    .iter()
                     .map(|column| Chunk::new(Arc::clone(column), Arc::clone(&self.properties)))
                     .collect();
             }
@@ -128,7 +137,8 @@ impl<'c, R: Sync> ColumnFile<'c, R> {
         group.close().map(drop)
     }
 
-    /// Ends the file and gives it its name. Returns how many numbers were too large for their columns, and are null.
+    /// Completes the file and renames it to its path. Returns the number of values that were too large for their column and are null, by
+    /// column.
     ///
     /// # Errors
     /// If it cannot be written.
@@ -146,7 +156,7 @@ impl<'c, R: Sync> ColumnFile<'c, R> {
     }
 }
 
-/// Snappy, which every reader has; dictionaries for all but keys, which have no value twice.
+/// Writer settings: Snappy compression, which every reader supports, and dictionaries except for keys, which are unique.
 fn properties<R>(columns: &[Column<R>], metadata: &FileMetadata) -> WriterProperties {
     let pairs = metadata
         .pairs

@@ -1,4 +1,4 @@
-//! The pages of one column in one row group, compressed and in memory: [`Pages`].
+//! [`Pages`]: the compressed pages of one column in one row group, in memory.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -7,8 +7,8 @@ use parquet::column::page::{CompressedPage, PageWriteSpec, PageWriter};
 use parquet::errors::Result;
 use parquet::file::writer::{SerializedPageWriter, TrackedWrite};
 
-/// The pages of a column, which its writer and the row group share. A file has one column after another, and all columns of a row
-/// group grow at once: so they grow in memory, compressed.
+/// The compressed pages of a column, shared by its writer and the row group. They are kept in memory, because all columns of a row group
+/// grow at once, but the file contains one column after the other.
 #[derive(Clone)]
 pub(super) struct Pages(Arc<Mutex<TrackedWrite<Vec<u8>>>>);
 
@@ -18,7 +18,7 @@ impl Pages {
     }
 
     /// Takes the bytes written so far.
-    pub(super) fn bytes(&self) -> Result<Bytes> {
+    pub(super) fn take_bytes(&self) -> Result<Bytes> {
         let mut pages = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let pages = std::mem::replace(&mut *pages, TrackedWrite::new(Vec::new()));
         pages.into_inner().map(Bytes::from)

@@ -84,21 +84,25 @@ fn write(path: &Path, rows: &[Values], at_once: usize, limits: GroupLimits) {
     for some in rows.chunks(at_once) {
         file.append(some).unwrap();
     }
-    assert!(!path.exists(), "it has its name once it is complete");
+    assert!(!path.exists(), "an unfinished file has another name");
     assert!(file.finish().unwrap().is_empty());
 }
 
 /// The rows of a file as JSON, and the number of its row groups.
 fn read(path: &Path) -> (Vec<serde_json::Value>, usize) {
     let reader = SerializedFileReader::new(File::open(path).unwrap()).unwrap();
-    let rows = reader.get_row_iter(None).unwrap();
-    let rows = rows.map(|row| {
-        let row = row.unwrap();
-        let cells = row.get_column_iter();
-        let cells = cells.map(|(name, field)| (name.clone(), value(field)));
-        serde_json::Value::Object(cells.collect())
-    });
-    (rows.collect(), reader.num_row_groups())
+    let rows = reader
+        .get_row_iter(None)
+        .unwrap()
+        .map(|row| {
+            row.unwrap()
+                .get_column_iter()
+                .map(|(name, field)| (name.clone(), value(field)))
+                .collect()
+        })
+        .map(serde_json::Value::Object)
+        .collect();
+    (rows, reader.num_row_groups())
 }
 
 fn value(field: &Field) -> serde_json::Value {
@@ -145,41 +149,41 @@ fn values_and_nulls_are_read_back() {
         ),
         (Some(&0), Some(&49_998), Some(25_000))
     );
-    // A text that many rows have is there once.
+    // A text that many rows share is stored once.
     assert!(group.column(2).dictionary_page_offset().is_some());
     assert!(group.column(2).compressed_size() < 10_000);
     assert!(group.column(0).dictionary_page_offset().is_none());
 }
 
 #[test]
-fn the_same_rows_are_the_same_bytes_in_row_groups_of_a_limited_size() {
+fn row_groups_have_limits_and_files_are_reproducible() {
     let folder = tempfile::tempdir().unwrap();
-    let path = |name: &str| folder.path().join(name);
+    let [one, two, three, empty] =
+        ["one", "two", "three", "empty"].map(|name| folder.path().join(name));
     let rows: Vec<Values> = (0..5_000).map(row).collect();
     let by_rows = GroupLimits {
         rows: 2_048,
         long_bytes: usize::MAX,
     };
-    write(&path("one"), &rows, 1_024, by_rows);
-    write(&path("two"), &rows, 1_024, by_rows);
-    let bytes = |name: &str| fs::read(path(name)).unwrap();
-    assert_eq!(bytes("one"), bytes("two"));
-    let (all, groups) = read(&path("one"));
+    write(&one, &rows, 1_024, by_rows);
+    write(&two, &rows, 1_024, by_rows);
+    assert_eq!(fs::read(&one).unwrap(), fs::read(&two).unwrap());
+    let (all, groups) = read(&one);
     assert_eq!((all.len(), groups), (5_000, 3));
     let by_bytes = GroupLimits {
         rows: usize::MAX,
         long_bytes: 20_000,
     };
-    write(&path("three"), &rows, 100, by_bytes);
-    let (same, groups) = read(&path("three"));
+    write(&three, &rows, 100, by_bytes);
+    let (same, groups) = read(&three);
     assert_eq!(same, all);
     assert!((2..=4).contains(&groups), "{groups}");
-    write(&path("empty"), &[], 1, LIMITS);
-    assert_eq!(read(&path("empty")), (Vec::new(), 0));
+    write(&empty, &[], 1, LIMITS);
+    assert_eq!(read(&empty), (Vec::new(), 0));
 }
 
 #[test]
-fn what_does_not_fit_is_null_or_an_error() {
+fn misfits_are_null_or_errors() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("table");
     let columns = columns();
@@ -215,7 +219,7 @@ fn what_does_not_fit_is_null_or_an_error() {
 }
 
 #[test]
-fn metadata_of_no_file_and_of_another_file_are_none() {
+fn missing_and_damaged_files_have_no_metadata() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("table");
     assert_eq!(FileMetadata::read(&path).unwrap(), None);

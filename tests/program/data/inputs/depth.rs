@@ -65,7 +65,7 @@ fn every_code_is_darkened_before_it_is_rounded() {
         let digest = blake3::hash(&bytes).to_hex().to_string();
         assert_ne!(file.digest().to_string(), digest);
         let mut differ = [0; 6];
-        let drops = [200, 400, 600, 750, 900, 220].map(Severity::hundredths);
+        let drops = [200, 400, 600, 750, 900, 220].map(Severity::from_hundredths);
         for (drop, differ) in drops.into_iter().zip(&mut differ) {
             let factor = (-drop.value() / 2.2).exp2();
             let of = |value: f64| (255.0 * value * factor + 0.5 + 1e-9).floor() as u8;

@@ -54,7 +54,7 @@ fn light_is_clipped_after_the_drop() {
     for (light, shown) in lights.iter().zip(shown.samples()) {
         assert_eq!(*shown, code(*light, 0.0), "{light}");
     }
-    for drop in [100, 200, 400, 600, 750, 900, 1600].map(Severity::hundredths) {
+    for drop in [100, 200, 400, 600, 750, 900, 1600].map(Severity::from_hundredths) {
         let dark = expose(&pixels, drop);
         for (light, dark) in lights.iter().zip(dark.samples()) {
             assert_eq!(*dark, code(*light, drop.value()), "{light} at {drop}");

@@ -32,7 +32,7 @@ fn always(random: &mut StdRng, design: &Design, _: &Resamples) -> [Option<bool>;
 /// Whether the interval of a score holds the truth.
 fn score(sums: &[(f64, f64)], max_weight: f64, truth: f64) -> [Option<bool>; 1] {
     let n = sums.iter().map(|(_, n)| n).sum::<f64>() as usize;
-    [Estimate::scored(sums, max_weight, n).map(|score| holds(score, truth))]
+    [Estimate::from_scores(sums, max_weight, n).map(|score| holds(score, truth))]
 }
 
 /// Scores between 0 and 1 that are not all 0 or 1, as expected scores are.

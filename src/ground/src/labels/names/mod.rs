@@ -1,4 +1,4 @@
-//! Classes of the words of data sets: [`meaning()`], from a word to a class of mpcat40.
+//! Classes of the words of data sets: [`meaning()`] maps a word to a class of mpcat40.
 
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
@@ -12,19 +12,20 @@ const OVERRIDES: &str = include_str!("overrides.tsv");
 /// Table of the object types of AI2-THOR.
 const THOR: &str = include_str!("thor.tsv");
 
-/// Class of words that no table has.
+/// Class of words that are in no table.
 pub const UNKNOWN: &str = "misc";
 
 type NameTable = BTreeMap<&'static str, &'static str>;
 
-fn table(text: &'static str) -> NameTable {
+fn parse_table(text: &'static str) -> NameTable {
     text.lines()
         .filter(|line| !line.starts_with('#'))
         .filter_map(|line| line.split_once('\t'))
         .collect()
 }
 
-static TABLES: LazyLock<[NameTable; 3]> = LazyLock::new(|| [OVERRIDES, HM3D, THOR].map(table));
+static TABLES: LazyLock<[NameTable; 3]> =
+    LazyLock::new(|| [OVERRIDES, HM3D, THOR].map(parse_table));
 
 /// Meaning of a word of a data set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -64,8 +65,8 @@ pub fn meaning(word: &str) -> Meaning {
     }
 }
 
-/// The class of a word of a data set; `None` if the word has no meaning. Words that no table has get [`UNKNOWN`] and are counted
-/// in `unlisted` under the name `original`.
+/// The class of a word of a data set; `None` if the word is empty or means unknown. A word that is in no table has the class
+/// [`UNKNOWN`], and `count` is added to its entry `original` in `unlisted`.
 pub fn class_of(
     word: &str,
     original: &str,
@@ -82,8 +83,8 @@ pub fn class_of(
     }
 }
 
-/// The class that overrides the data set's class of a word; `None` if there is none.
-pub fn overridden(word: &str) -> Option<&'static str> {
+/// The class that overrides the data set's class of a word; `None` if that class is kept.
+pub fn class_override(word: &str) -> Option<&'static str> {
     TABLES[0].get(normalized(word).as_str()).copied()
 }
 
@@ -117,15 +118,15 @@ mod tests {
     fn every_line_is_a_word_and_a_class() {
         for text in [HM3D, OVERRIDES, THOR] {
             let lines: Vec<&str> = text.lines().filter(|line| !line.starts_with('#')).collect();
-            assert_eq!(table(text).len(), lines.len());
-            for (word, class) in table(text) {
+            assert_eq!(parse_table(text).len(), lines.len());
+            for (word, class) in parse_table(text) {
                 assert!(canonical().contains(class), "{word}: {class}");
             }
             let mut sorted = lines.clone();
             sorted.sort_unstable_by_key(|line| line.split('\t').next());
             assert_eq!(sorted, lines);
         }
-        assert_eq!(table(HM3D).len(), 2295);
+        assert_eq!(parse_table(HM3D).len(), 2295);
     }
 
     #[test]

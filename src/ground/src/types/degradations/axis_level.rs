@@ -4,14 +4,14 @@ use std::borrow::Cow;
 use std::fmt;
 
 use super::degradation::{Degradation, Kind, ReadingName};
-use super::light_group::RunGroup;
 use super::pair_dark::{PairDark, PhotoName};
+use super::run_group::RunGroup;
 use super::severity::{Axis, Severity};
 use super::treatment::Treatment;
 use crate::types::text::words::written_as_text;
 
-/// A point on the axis of a curve: L0 (the untouched frame) or a severity. All kinds of one axis share their points. The points of
-/// an axis follow each other by severity. The darkness of pairs is on no axis, because it differs by frame; it follows all others.
+/// A point on the axis of a curve: L0 (the untouched frame) or a severity. All kinds on one axis share its points, which are ordered by
+/// severity. The darkness of pairs is on no axis, because it differs by frame; it is ordered last.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct AxisLevel(Point);
 
@@ -56,7 +56,7 @@ impl AxisLevel {
 
     /// True if the level belongs in the tables of an axis: L0 in all of them, photographed pairs in those of light.
     #[must_use]
-    pub fn is_shown_on(self, axis: Axis) -> bool {
+    pub fn belongs_to(self, axis: Axis) -> bool {
         match self.0 {
             Point::Untouched => true,
             Point::Degraded(kind, _) => kind.axis() == axis,
@@ -64,7 +64,7 @@ impl AxisLevel {
         }
     }
 
-    /// The distance from L0 in the unit of the axis; 0 for pairs, which have none of their own.
+    /// The distance from L0 in the unit of the axis; 0 for pairs, whose darkness differs by frame.
     #[must_use]
     pub fn value(self) -> f64 {
         self.severity().map_or(0.0, Severity::value)
@@ -96,8 +96,8 @@ impl fmt::Display for AxisLevel {
     }
 }
 
-/// A kind of degradation in one noise profile, at any severity: the levels of one curve share it. Or the darkness of pairs, which is
-/// on no curve: it has no kind.
+/// A kind of degradation in one noise profile, at any severity: the levels of one curve share it. The darkness of pairs is a variant
+/// without a kind, because it is on no curve.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub struct Variant {
     /// The darkness of pairs; `None` for untouched frames and degradations. It is the first field, so that pairs follow all others.
@@ -106,12 +106,12 @@ pub struct Variant {
     pub kind: Option<Kind>,
     /// The noise profile; `None` if the kind has none.
     pub reading: Option<ReadingName>,
-    /// The runs that show these images, in a report on runs that show different ones; else `None`.
+    /// The runs with these images, in a report on runs whose images differ; otherwise `None`.
     pub group: Option<RunGroup>,
 }
 
 impl Variant {
-    /// The value for untouched frames: no kind and no reading.
+    /// The variant of untouched frames: no kind and no noise profile.
     pub const NONE: Self = Self {
         kind: None,
         reading: None,
@@ -119,13 +119,13 @@ impl Variant {
         group: None,
     };
 
-    /// Whether these are untouched frames, of whichever runs.
+    /// True for untouched frames, of any group of runs.
     #[must_use]
     pub fn is_untouched(&self) -> bool {
         self.kind.is_none() && self.pair.is_none()
     }
 
-    /// Whether these frames have less light than untouched ones, or a degradation of another kind.
+    /// True for degraded frames and for pairs in the dark.
     #[must_use]
     pub fn is_degraded(&self) -> bool {
         !self.is_untouched()
@@ -146,7 +146,7 @@ impl Variant {
         self.pair.as_ref().and_then(PairDark::photograph)
     }
 
-    /// The kind of synthesis with a light exposure drop, also one that differs by frame; `None` for images that are not synthetic.
+    /// The kind of degradation, or of the synthesis that matches a photograph; `None` for images that are not synthetic.
     #[must_use]
     pub fn synthetic_kind(&self) -> Option<Kind> {
         match &self.pair {
@@ -163,21 +163,21 @@ impl Variant {
             return pair.title();
         }
         let kind = self.kind.map_or("untouched", Kind::title);
-        self.named_reading()
+        self.unusual_reading()
             .map_or(kind.to_owned(), |reading| format!("{kind} @{reading}"))
     }
 
-    /// The kind's word with the noise profile if it is not the paper's, as `noise@eld`, or the name of a pair's darkness; without
-    /// the group of runs.
+    /// The kind's word, or the name of a pair's darkness, with the noise profile if it is not the paper's, as `noise@eld`; without the
+    /// group of runs.
     #[must_use]
     pub fn kind_and_reading(&self) -> String {
-        match self.named_reading() {
+        match self.unusual_reading() {
             None => self.word().into_owned(),
             Some(reading) => format!("{}@{reading}", self.word()),
         }
     }
 
-    /// The group of runs as names end with it, ` @RUN`; empty without a group.
+    /// The suffix of names for the group of runs, ` @RUN`; empty without a group.
     #[must_use]
     pub fn group_suffix(&self) -> String {
         self.group
@@ -185,7 +185,8 @@ impl Variant {
             .map_or_else(String::new, ToString::to_string)
     }
 
-    fn named_reading(&self) -> Option<&ReadingName> {
+    /// The noise profile, unless it is the paper's.
+    fn unusual_reading(&self) -> Option<&ReadingName> {
         self.reading
             .as_ref()
             .filter(|name| **name != ReadingName::PAPER)

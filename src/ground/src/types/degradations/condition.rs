@@ -7,8 +7,8 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 use super::axis_level::{AxisLevel, Variant};
 use super::degradation::Degradation;
-use super::light_group::RunGroup;
 use super::pair_dark::{PairDark, PhotoName};
+use super::run_group::RunGroup;
 use super::treatment::Treatment;
 use crate::error::Error;
 use crate::types::text::words::as_text;
@@ -18,7 +18,10 @@ use crate::types::text::words::as_text;
 pub struct EnhancerName(String);
 
 impl EnhancerName {
-    /// Checks a name: it must not be empty and may only have letters, digits, `_`, `-` and `.`.
+    /// Checks a name.
+    ///
+    /// # Errors
+    /// If it is empty or has other characters than letters, digits, `_`, `-` and `.`.
     pub fn new(name: &str) -> Result<Self, Error> {
         if name.is_empty()
             || !name
@@ -50,15 +53,16 @@ impl fmt::Display for EnhancerName {
 
 /// A treatment with or without an enhancer: the state in which a frame is shown.
 ///
-/// The name is `LABEL-KIND[@READING][+ENHANCER]` or `L0[+ENHANCER]`, of a photograph in the dark `NAME[+ENHANCER]`, and of synthetic
-/// images as dark as it `match-KIND[@READING][+ENHANCER]`; `&` is reserved for several degradations in sequence.
+/// It is written `LABEL-KIND[@READING][+ENHANCER]` or `L0[+ENHANCER]`; a photograph in the dark is `NAME[+ENHANCER]`, and a synthetic image
+/// that is as dark as it is `match-KIND[@READING][+ENHANCER]`. READING is a noise profile. `&` is reserved for several degradations in
+/// sequence.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Condition {
     /// Treatment of the frame before it is enhanced.
     pub treatment: Treatment,
     /// The enhancer; `None` if the image is not enhanced.
     pub enhancer: Option<EnhancerName>,
-    /// The runs that show these images, in a report on runs that show different ones; else `None`.
+    /// The runs with these images, in a report on runs whose images differ; otherwise `None`.
     pub group: Option<RunGroup>,
 }
 
@@ -80,13 +84,13 @@ impl Condition {
         }
     }
 
-    /// The degradation of the frame; `None` for L0, a photograph in the dark, and synthetic images that are as dark as it.
+    /// The degradation of the frame; `None` for L0 and for pairs.
     #[must_use]
     pub fn degradation(&self) -> Option<&Degradation> {
         self.treatment.degradation()
     }
 
-    /// The darkness of a pair; `None` for L0 and for degradations.
+    /// The darkness of the pair; `None` for L0 and for degradations.
     #[must_use]
     pub fn pair(&self) -> Option<&PairDark> {
         self.treatment.pair()
@@ -106,7 +110,7 @@ impl Condition {
 
     /// The value of the column `variant`: the kind with its noise profile, or the darkness of a pair; and its group of runs.
     #[must_use]
-    pub fn kind_reading(&self) -> Variant {
+    pub fn variant(&self) -> Variant {
         Variant {
             group: self.group.clone(),
             ..(&self.treatment).into()
@@ -176,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn a_text_that_is_not_a_condition_is_refused() {
+    fn invalid_conditions_are_refused() {
         let cases = [
             ("L3-noise+", "not a valid name of an enhancer"),
             ("L3-noise+a b", "not a valid name of an enhancer"),
@@ -208,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn order_is_by_severity() {
+    fn conditions_are_ordered_by_severity() {
         let mut names = [
             "dark",
             "L3-ev",

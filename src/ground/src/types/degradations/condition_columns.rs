@@ -1,4 +1,4 @@
-//! The columns of a record that follow from the condition of its images: [`ConditionColumns`].
+//! The columns of a record that are derived from the condition of its images: [`ConditionColumns`].
 
 use serde::Serialize;
 
@@ -6,7 +6,7 @@ use super::degradation::{Degradation, ReadingName};
 use super::severity::{Axis, Severity};
 use crate::types::{AxisLevel, Condition, EnhancerName, PairDark};
 
-/// The columns that follow from a condition; without a condition no image was shown.
+/// The columns derived from a condition. Without a condition no image was shown.
 #[derive(Debug, Serialize)]
 pub struct ConditionColumns<'a> {
     /// The condition; `None` without an image.
@@ -31,7 +31,7 @@ impl<'a> ConditionColumns<'a> {
     pub fn new(condition: Option<&'a Condition>) -> Self {
         let degradation = condition.and_then(|condition| condition.degradation());
         let level = condition.map(Condition::level);
-        // The darkness of pairs differs by frame; it is in the facts about the image.
+        // The darkness of pairs differs by frame; it is stored with each image (`PairFacts`).
         let light = level
             .filter(|level| *level != AxisLevel::PAIR)
             .filter(|level| level.axis().is_none_or(|axis| axis == Axis::LIGHT));

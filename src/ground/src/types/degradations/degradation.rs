@@ -11,7 +11,7 @@ use super::severity::{Axis, Severity};
 use crate::error::Error;
 use crate::types::text::words::written_as_text;
 
-/// A kind of degradation at one severity, in one noise profile if the kind has readings.
+/// A kind of degradation at one severity, in one noise profile ("reading") if the kind has several.
 ///
 /// The untouched frame, L0, is not a degradation: it is the `None` of an `Option`.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -22,22 +22,22 @@ pub struct Degradation {
 }
 
 impl Degradation {
-    /// A degradation; if the kind has readings and none is named, the reading is `paper`.
+    /// A degradation. The default noise profile of a kind that has several is `paper`.
     ///
     /// # Errors
-    /// If the severity is above the maximum of the kind, or a reading is named for a kind that has none.
+    /// If the severity is above the maximum of the kind, or a noise profile is named for a kind without noise profiles.
     pub fn new(
         kind: Kind,
         severity: Severity,
         reading: Option<ReadingName>,
     ) -> Result<Self, Error> {
-        if severity > kind.largest() {
+        if severity > kind.max_severity() {
             let problem = format_args!(
                 "{} {} is more than a {} takes; the largest is {}",
                 severity,
                 kind.axis().unit,
                 kind.title(),
-                kind.largest()
+                kind.max_severity()
             );
             return Err(Error::usage("condition", problem));
         }
@@ -69,7 +69,7 @@ impl Degradation {
         self.severity
     }
 
-    /// The noise profile; `None` if the kind has no readings.
+    /// The noise profile; `None` if the kind has none.
     #[must_use]
     pub fn reading(&self) -> Option<&ReadingName> {
         self.reading.as_ref()
@@ -83,11 +83,17 @@ impl Degradation {
 }
 
 impl Ord for Degradation {
-    /// By level, kind and noise profile: the levels of one axis follow each other.
+    /// Compares axis, severity, kind and noise profile.
     fn cmp(&self, other: &Self) -> Ordering {
-        let key = |how: &Self| (how.kind.first_of_axis(), how.severity, how.kind);
-        let order = key(self).cmp(&key(other));
-        order.then_with(|| self.reading.cmp(&other.reading))
+        let [one, two] = [self, other].map(|how| {
+            (
+                how.kind.first_of_axis(),
+                how.severity,
+                how.kind,
+                &how.reading,
+            )
+        });
+        one.cmp(&two)
     }
 }
 
@@ -111,39 +117,44 @@ impl FromStr for Degradation {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self, Error> {
-        let wrong = |problem: &dyn fmt::Display| {
-            let form =
-                "the form is L0, L3-ev, L3-noise, E3.3-noise, L3-noise@READING or T33.33-motion";
-            Error::usage("condition", format_args!("{text:?}: {problem}; {form}"))
-        };
         let (plain, reading) = match text.split_once('@') {
             None => (text, None),
             Some((plain, reading)) => (plain, Some(ReadingName::new(reading)?)),
         };
         let (label, word) = plain
             .split_once('-')
-            .ok_or_else(|| wrong(&"not of that form"))?;
-        let kind = Kind::from_word(word)
-            .ok_or_else(|| wrong(&format_args!("no kind of degradation is named {word:?}")))?;
+            .ok_or_else(|| syntax_error(text, "not of that form"))?;
+        let kind = Kind::from_word(word).ok_or_else(|| {
+            syntax_error(
+                text,
+                format_args!("no kind of degradation is named {word:?}"),
+            )
+        })?;
         if reading == Some(ReadingName::PAPER) {
-            return Err(wrong(&"the reading paper is written without its name"));
+            let problem = "the reading paper is written without its name";
+            return Err(syntax_error(text, problem));
         }
-        let severity = kind.severity(label).map_err(|e| wrong(&e))?;
+        let severity = kind.severity(label).map_err(|e| syntax_error(text, e))?;
         Self::new(kind, severity, reading)
     }
 }
 
-/// A kind of degradation. A new kind is described in this `impl` and implemented in the crate `darkqa-light`; no other
-/// place lists the kinds.
+fn syntax_error(text: &str, problem: impl fmt::Display) -> Error {
+    let form = "the form is L0, L3-ev, L3-noise, E3.3-noise, L3-noise@READING or T33.33-motion";
+    Error::usage("condition", format_args!("{text:?}: {problem}; {form}"))
+}
+
+/// A kind of degradation. To add one, describe it in this `impl` and implement it in the crate `darkqa-light`; the kinds are listed
+/// nowhere else.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Kind {
     /// Less light, without noise.
     Exposure,
     /// Less light, with sensor noise.
     Sensor,
-    /// Less light, met by a camera with automatic exposure: a longer exposure, gain, and a remaining darkness.
+    /// Less light for a camera with automatic exposure: a longer exposure time, gain, and the darkness that remains.
     Auto,
-    /// The motion blur of an exposure, without less light.
+    /// The motion blur of an exposure, without a loss of light.
     Motion,
 }
 
@@ -182,7 +193,7 @@ impl Kind {
         }
     }
 
-    /// The first kind of the same axis, which stands for all of them.
+    /// The first kind on the same axis, which represents the axis.
     #[must_use]
     pub(super) fn first_of_axis(self) -> Self {
         Self::ALL
@@ -191,7 +202,7 @@ impl Kind {
             .unwrap_or(self)
     }
 
-    /// The severities of the paper, or of a kind that the paper does not have, which are the default.
+    /// The default severities: those of the paper, or chosen ones for a kind that the paper does not have.
     #[must_use]
     pub fn ladder(self) -> &'static [Severity] {
         match self {
@@ -202,34 +213,34 @@ impl Kind {
 
     /// The maximum severity, in the kind's unit.
     #[must_use]
-    pub fn largest(self) -> Severity {
+    pub fn max_severity(self) -> Severity {
         match self {
-            // There fewer than three of the 256 codes are left.
-            Self::Exposure | Self::Sensor | Self::Auto => Severity::hundredths(1600),
-            // Half a second; chosen. Most cameras move too far in less.
-            Self::Motion => Severity::hundredths(50_000),
+            // At a drop of 16 EV fewer than three of the 256 codes are left.
+            Self::Exposure | Self::Sensor | Self::Auto => Severity::from_hundredths(1600),
+            // Half a second; chosen. Most moving cameras travel too far in less time.
+            Self::Motion => Severity::from_hundredths(50_000),
         }
     }
 
-    /// Whether the kind has noise profiles: several ways to understand it.
+    /// True if the kind has noise profiles: several readings of the paper's noise model.
     #[must_use]
     pub fn has_readings(self) -> bool {
         self == Self::Sensor
     }
 
-    /// Whether the kind has sensor noise.
+    /// True if the kind adds sensor noise.
     #[must_use]
     pub fn has_noise(self) -> bool {
         matches!(self, Self::Sensor | Self::Auto)
     }
 
-    /// Whether the kind has the motion blur of an exposure.
+    /// True if the kind blurs the image by camera motion during the exposure.
     #[must_use]
     pub fn has_motion(self) -> bool {
         matches!(self, Self::Auto | Self::Motion)
     }
 
-    /// Whether the kind can be as dark as a photograph: its severity is an exposure drop.
+    /// True if the kind can match the darkness of a photograph, because its severity is an exposure drop.
     #[must_use]
     pub fn can_match(self) -> bool {
         self.axis() == Axis::LIGHT
@@ -241,7 +252,7 @@ impl Kind {
         (self == Self::Sensor).then_some(Self::Exposure)
     }
 
-    /// The kind that all findings about this one and those that extend it share: the base, or the kind itself.
+    /// The kind under which findings about this kind are grouped: its base, or the kind itself.
     #[must_use]
     pub fn root(self) -> Self {
         self.base().unwrap_or(self)
@@ -250,14 +261,14 @@ impl Kind {
     /// Gain in EV that brightens a small copy of a degraded image for display. It is 0 for kinds that do not reduce the light, and for
     /// kinds whose darkness depends on the camera's settings.
     #[must_use]
-    pub fn relight(self, severity: Severity) -> f32 {
+    pub fn display_gain(self, severity: Severity) -> f32 {
         match self {
             Self::Exposure | Self::Sensor => severity.value() as f32,
             Self::Auto | Self::Motion => 0.0,
         }
     }
 
-    /// The letter before the number of a severity that has no name: `E` for exposure drops, `T` for exposure times.
+    /// The letter in the label of a severity that has no name: `E` for exposure drops, `T` for exposure times.
     #[must_use]
     pub fn letter(self) -> char {
         match self {
@@ -266,10 +277,13 @@ impl Kind {
         }
     }
 
-    /// The name of a severity: `L1` to `L5` for the exposure drops of the paper, otherwise as `E3.3`; of exposure times, as `T33.33`.
+    /// The label of a severity: `L1` to `L5` for the exposure drops of the paper, `E3.3` for others, `T33.33` for exposure times.
     #[must_use]
     pub fn label(self, severity: Severity) -> String {
-        let index = self.named().iter().position(|named| *named == severity);
+        let index = self
+            .named_severities()
+            .iter()
+            .position(|named| *named == severity);
         match index {
             Some(index) => format!("L{}", index + 1),
             None => format!("{}{severity}", self.letter()),
@@ -277,22 +291,21 @@ impl Kind {
     }
 
     /// The severities with names of their own, L1 to L5.
-    fn named(self) -> &'static [Severity] {
+    fn named_severities(self) -> &'static [Severity] {
         match self {
             Self::Exposure | Self::Sensor | Self::Auto => self.ladder(),
             Self::Motion => &[],
         }
     }
 
-    /// The severity with a name, as `L3`, `E3.3` or `T33.33`.
+    /// Parses the label of a severity, as `L3`, `E3.3` or `T33.33`.
     ///
     /// # Errors
-    /// If no severity has the name, or if the severity has another name: `E6` is `L3`.
+    /// If no severity has the label, or if the label is not the canonical one: `E6` must be written `L3`.
     pub fn severity(self, label: &str) -> Result<Severity, Error> {
-        let wrong = |problem: String| Error::usage("level", problem);
         let upper = label.to_ascii_uppercase();
         let named = self
-            .named()
+            .named_severities()
             .iter()
             .find(|severity| self.label(**severity) == upper);
         if let Some(severity) = named {
@@ -305,19 +318,28 @@ impl Kind {
                 }
                 Self::Motion => "L0 and not an exposure time in milliseconds such as T33.33",
             };
-            return Err(wrong(format!("{label:?} is not {expected}")));
+            return Err(Error::usage(
+                "level",
+                format_args!("{label:?} is not {expected}"),
+            ));
         };
         let severity = number.parse::<Severity>()?;
         if self.label(severity) != upper {
             let expected = self.label(severity);
-            return Err(wrong(format!("{label:?} is written {expected}")));
+            return Err(Error::usage(
+                "level",
+                format_args!("{label:?} is written {expected}"),
+            ));
         }
-        if severity > self.largest() {
-            return Err(wrong(format!(
-                "{label:?} is above {}{}",
-                self.letter(),
-                self.largest()
-            )));
+        if severity > self.max_severity() {
+            return Err(Error::usage(
+                "level",
+                format_args!(
+                    "{label:?} is above {}{}",
+                    self.letter(),
+                    self.max_severity()
+                ),
+            ));
         }
         Ok(severity)
     }
@@ -342,9 +364,9 @@ written_as_text!(Kind);
 pub struct ReadingName(Cow<'static, str>);
 
 impl ReadingName {
-    /// The paper's noise model exactly as printed; conditions leave this name out.
+    /// The paper's noise model exactly as printed. Conditions are written without this name.
     pub const PAPER: Self = Self(Cow::Borrowed("paper"));
-    /// Settings that match no named reading.
+    /// Settings that match no named noise profile.
     pub const CUSTOM: Self = Self(Cow::Borrowed("custom"));
 
     /// Checks a name.
@@ -362,7 +384,7 @@ impl ReadingName {
             );
             return Err(Error::usage("reading", problem));
         }
-        // Most records have the paper's reading: its name is not allocated.
+        // Most records use the paper's noise profile, so its name is not allocated.
         Ok(if name == Self::PAPER.as_str() {
             Self::PAPER
         } else {
@@ -370,7 +392,7 @@ impl ReadingName {
         })
     }
 
-    /// A name that needs no check.
+    /// A valid name, which is not checked.
     pub const fn from_static(name: &'static str) -> Self {
         Self(Cow::Borrowed(name))
     }
@@ -385,8 +407,8 @@ impl ReadingName {
 impl Ord for ReadingName {
     /// `paper` first, then in alphabetical order.
     fn cmp(&self, other: &Self) -> Ordering {
-        let is_other = |name: &Self| *name != Self::PAPER;
-        (is_other(self), &self.0).cmp(&(is_other(other), &other.0))
+        let [one, two] = [self, other].map(|name| (*name != Self::PAPER, &name.0));
+        one.cmp(&two)
     }
 }
 

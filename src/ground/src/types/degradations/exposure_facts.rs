@@ -1,4 +1,4 @@
-//! How a camera exposed a frame: [`ExposureFacts`].
+//! Camera settings of a simulated exposure: [`ExposureFacts`].
 
 use serde::{Deserialize, Serialize};
 
@@ -6,13 +6,13 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ExposureFacts {
-    /// Stops of longer exposure, in EV; `None` without automatic exposure, as the next two.
+    /// Longer exposure time, in EV; `None` without automatic exposure.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shutter: Option<f64>,
-    /// Stops of gain, in EV.
+    /// Gain, in EV; `None` without automatic exposure.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gain: Option<f64>,
-    /// Darkness that the exposure did not compensate, in EV.
+    /// Remaining darkness that the exposure did not compensate, in EV; `None` without automatic exposure.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dark: Option<f64>,
     /// Exposure time, in milliseconds.
@@ -23,13 +23,14 @@ pub struct ExposureFacts {
     /// Length of the motion blur, in pixels of the frame; `None` for several frames in which it differs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub blur_px: Option<f64>,
-    /// Direction of the motion blur in degrees, from along a row towards down a column; `None` as for the length.
+    /// Direction of the motion blur in degrees: 0 is along a row, 90 down a column; `None` as for the length.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub blur_angle: Option<f64>,
 }
 
 impl ExposureFacts {
-    /// The settings that all frames of a walk share; `None` if a frame has none.
+    /// The settings of a walk: blur length and angle only if they are equal in all frames, the others from the first frame. `None` if a
+    /// frame has no settings.
     #[must_use]
     pub fn shared(mut all: impl Iterator<Item = Option<Self>>) -> Option<Self> {
         let first = all.next()??;
@@ -46,7 +47,7 @@ impl ExposureFacts {
     }
 }
 
-/// No number is NaN.
+// No number is NaN.
 impl Eq for ExposureFacts {}
 
 #[cfg(test)]
@@ -54,25 +55,24 @@ mod tests {
     use super::*;
 
     #[test]
-    fn frames_share_what_is_equal() {
-        let facts = |blur_px, blur_angle| {
+    fn frames_share_equal_settings() {
+        let [first, second] = [10.0, 20.0].map(|blur_angle| {
             Some(ExposureFacts {
                 shutter: Some(2.0),
                 gain: None,
                 dark: None,
                 time_ms: 8.33,
                 system_gain: None,
-                blur_px: Some(blur_px),
+                blur_px: Some(2.0),
                 blur_angle: Some(blur_angle),
             })
-        };
-        let shared = |all: &[Option<ExposureFacts>]| ExposureFacts::shared(all.iter().copied());
-        let one = shared(&[facts(2.0, 10.0), facts(2.0, 20.0)]).unwrap();
+        });
+        let one = ExposureFacts::shared([first, second].into_iter()).unwrap();
         assert_eq!((one.blur_px, one.blur_angle), (Some(2.0), None));
         assert_eq!(one.shutter, Some(2.0));
-        assert_eq!(shared(&[facts(1.0, 0.0)]), facts(1.0, 0.0));
-        assert_eq!(shared(&[facts(1.0, 0.0), None]), None);
-        assert_eq!(shared(&[]), None);
+        assert_eq!(ExposureFacts::shared([first].into_iter()), first);
+        assert_eq!(ExposureFacts::shared([first, None].into_iter()), None);
+        assert_eq!(ExposureFacts::shared([].into_iter()), None);
         let text = serde_json::to_string(&one).unwrap();
         assert_eq!(text, r#"{"shutter":2.0,"time_ms":8.33,"blur_px":2.0}"#);
         assert_eq!(serde_json::from_str::<ExposureFacts>(&text).unwrap(), one);

@@ -1,4 +1,4 @@
-//! Degradations and conditions: what was done to a frame before a model saw it, and the light of photographs.
+//! Degradations and conditions: the processing of a frame before a model sees it, and the light of photographs.
 
 mod axis_level;
 mod condition;
@@ -6,9 +6,9 @@ mod condition_columns;
 mod degradation;
 mod exposure_facts;
 mod kind_set;
-mod light_group;
 mod pair_dark;
 mod pair_facts;
+mod run_group;
 mod set_light;
 mod severity;
 mod treatment;
@@ -20,9 +20,9 @@ pub use condition_columns::ConditionColumns;
 pub use degradation::{Degradation, Kind, ReadingName};
 pub use exposure_facts::ExposureFacts;
 pub use kind_set::KindSet;
-pub use light_group::RunGroup;
 pub use pair_dark::{PairDark, PhotoName};
 pub use pair_facts::PairFacts;
+pub use run_group::RunGroup;
 pub use set_light::SetLight;
 pub use severity::{Axis, Severity};
 pub use treatment::Treatment;

@@ -1,4 +1,4 @@
-//! The darkness of a pair, which is not the same for every frame: [`PairDark`]; and the name of a photograph: [`PhotoName`].
+//! The darkness of a pair, a frame and a photograph of its scene in the dark: [`PairDark`], and the photograph's name: [`PhotoName`].
 
 use std::fmt;
 use std::str::FromStr;
@@ -17,7 +17,7 @@ const MATCH: &str = "match";
 pub struct PhotoName(String);
 
 impl PhotoName {
-    /// The name of a frame's photograph that the data do not name: `dark`, then `dark-2` and so on.
+    /// The default name of a frame's photograph at an index from 0: `dark`, then `dark-2` and so on.
     #[must_use]
     pub fn numbered(place: usize) -> Self {
         Self(match place {
@@ -26,27 +26,24 @@ impl PhotoName {
         })
     }
 
-    /// Checks a name. It becomes a condition, so it must not be one of another sort.
+    /// Checks a name. It is used as the name of a condition, so it must differ from all other conditions.
     ///
     /// # Errors
-    /// If it does not begin with a small letter, has other characters than small letters, digits, `_`, `-` and `.`, has more than 40
-    /// of them, or is a word of another condition.
+    /// If it does not begin with a lower-case letter, has other characters than lower-case letters, digits, `_`, `-` and `.`, is longer
+    /// than 40 characters, or is the name of another condition.
     pub fn new(name: &str) -> Result<Self, Error> {
-        let wrong = |problem: &str| {
-            let problem = format!("{name:?} is not a valid name of a dark photograph: {problem}");
-            Err(Error::usage("dark", problem))
-        };
         if !name.starts_with(|c: char| c.is_ascii_lowercase())
             || !name
                 .chars()
                 .all(|c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || "_-.".contains(c))
         {
-            return wrong(
+            return name_error(
+                name,
                 "it begins with a letter from a to z, and has only these, digits, '_', '-' and '.'",
             );
         }
         if name.len() > 40 {
-            return wrong("it has more than 40 characters");
+            return name_error(name, "it has more than 40 characters");
         }
         let mut letters = name.chars();
         let has_label = "let".contains(letters.next().unwrap_or_default())
@@ -55,7 +52,7 @@ impl PhotoName {
             || name.starts_with("match-")
             || Kind::from_word(name).is_some();
         if has_label || is_taken {
-            return wrong("another condition is written so; take another name");
+            return name_error(name, "another condition is written so; take another name");
         }
         Ok(Self(name.to_owned()))
     }
@@ -65,6 +62,11 @@ impl PhotoName {
     pub fn as_str(&self) -> &str {
         &self.0
     }
+}
+
+fn name_error(name: &str, problem: &str) -> Result<PhotoName, Error> {
+    let problem = format!("{name:?} is not a valid name of a dark photograph: {problem}");
+    Err(Error::usage("dark", problem))
 }
 
 impl fmt::Display for PhotoName {
@@ -79,17 +81,17 @@ impl<'de> Deserialize<'de> for PhotoName {
     }
 }
 
-/// A darkness that differs by frame: that of its photograph, or of the synthetic image that matches the photograph.
+/// The dark image of a pair: a photograph, or a synthetic image with the same darkness. The darkness differs by frame.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum PairDark {
-    /// Synthesis on the frame, with the exposure drop that its photograph has: the kind, and the reading if the kind has readings.
+    /// A synthetic image of the frame with the exposure drop of its photograph: the kind, and the noise profile if the kind has several.
     Match(Kind, Option<ReadingName>),
-    /// A photograph of the same scene in the dark. It passes no synthesis.
+    /// A photograph of the same scene in the dark, without synthesis.
     Photograph(PhotoName),
 }
 
 impl PairDark {
-    /// The name of the photograph; `None` for synthesis.
+    /// The name of the photograph; `None` for a synthetic image.
     #[must_use]
     pub fn photograph(&self) -> Option<&PhotoName> {
         match self {
@@ -107,7 +109,7 @@ impl PairDark {
         }
     }
 
-    /// The noise profile of synthesis; `None` for a photograph, and for kinds without readings.
+    /// The noise profile of synthesis; `None` for a photograph, and for kinds without noise profiles.
     #[must_use]
     pub fn reading(&self) -> Option<&ReadingName> {
         match self {
@@ -116,9 +118,9 @@ impl PairDark {
         }
     }
 
-    /// The same without the noise profile: images of one sort are compared as lights of one level.
+    /// Drops the noise profile: photographs of one name, or synthetic images of one kind, are compared across noise profiles.
     #[must_use]
-    pub fn sort(&self) -> Self {
+    pub fn without_reading(&self) -> Self {
         match self {
             Self::Photograph(name) => Self::Photograph(name.clone()),
             Self::Match(kind, _) => Self::Match(*kind, None),
@@ -166,23 +168,31 @@ impl FromStr for PairDark {
         let Some(kind) = text.strip_prefix("match-") else {
             return PhotoName::new(text).map(Self::Photograph);
         };
-        let wrong = |problem: &str| Error::usage("condition", format!("{text:?}: {problem}"));
         let (word, reading) = match kind.split_once('@') {
             None => (kind, None),
             Some((kind, reading)) => (kind, Some(ReadingName::new(reading)?)),
         };
         let kind = Kind::from_word(word)
             .filter(|kind| kind.can_match())
-            .ok_or_else(|| wrong("the forms are match-ev, match-noise and match-auto"))?;
+            .ok_or_else(|| {
+                match_error(text, "the forms are match-ev, match-noise and match-auto")
+            })?;
         if reading.is_some() && !kind.has_readings() {
-            return Err(wrong("this kind has no noise profiles"));
+            return Err(match_error(text, "this kind has no noise profiles"));
         }
         if reading == Some(ReadingName::PAPER) {
-            return Err(wrong("the reading paper is written without its name"));
+            return Err(match_error(
+                text,
+                "the reading paper is written without its name",
+            ));
         }
         let reading = reading.or_else(|| kind.has_readings().then_some(ReadingName::PAPER));
         Ok(Self::Match(kind, reading))
     }
+}
+
+fn match_error(text: &str, problem: &str) -> Error {
+    Error::usage("condition", format!("{text:?}: {problem}"))
 }
 
 #[cfg(test)]
@@ -190,7 +200,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_of_photographs_are_no_other_conditions() {
+    fn photograph_names_differ_from_other_conditions() {
         for name in [
             "dark", "dark-2", "lamp", "low_1.5s", "evening", "tungsten", "match",
         ] {
@@ -208,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn they_read_back() {
+    fn dark_images_of_pairs_read_back() {
         for text in [
             "dark",
             "dark-2",

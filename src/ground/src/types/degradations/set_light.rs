@@ -17,9 +17,9 @@ pub enum SetLight {
 }
 
 impl SetLight {
-    /// The name of L0 where it is shown: `L0`, or `as photographed`.
+    /// The label of L0 in tables and figures: `L0`, or `as photographed`.
     #[must_use]
-    pub fn untouched(self) -> &'static str {
+    pub fn l0_label(self) -> &'static str {
         match self {
             Self::Lit => "L0",
             Self::Dark => "as photographed",

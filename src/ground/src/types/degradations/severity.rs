@@ -17,7 +17,7 @@ pub struct Axis {
     pub unit: &'static str,
     /// Noun for an increase of the quantity, as `darkness`: findings name it as the cause of a loss.
     pub cause: &'static str,
-    /// Where there is much of it, as `in the dark`.
+    /// Phrase for large values of the quantity, as `in the dark`.
     pub place: &'static str,
 }
 
@@ -41,7 +41,7 @@ impl Axis {
     /// All axes, in the order of tables.
     pub const ALL: [Self; 2] = [Self::LIGHT, Self::MOTION];
 
-    /// The axes that `is_present` accepts, in the order of tables; the axis of light if it accepts none, for clean frames alone.
+    /// The axes that `is_present` accepts, in the order of tables; [`Self::LIGHT`] if it accepts none, as for a run with clean frames only.
     #[must_use]
     pub fn present(is_present: impl Fn(Self) -> bool) -> Vec<Self> {
         let axes: Vec<Self> = Self::ALL
@@ -62,29 +62,29 @@ pub struct Severity(NonZeroU16);
 
 impl Severity {
     /// Level L1, an exposure drop of 2 EV.
-    pub const L1: Self = Self::hundredths(200);
+    pub const L1: Self = Self::from_hundredths(200);
     /// Level L2, an exposure drop of 4 EV.
-    pub const L2: Self = Self::hundredths(400);
+    pub const L2: Self = Self::from_hundredths(400);
     /// Level L3, an exposure drop of 6 EV.
-    pub const L3: Self = Self::hundredths(600);
+    pub const L3: Self = Self::from_hundredths(600);
     /// Level L4, an exposure drop of 7.5 EV.
-    pub const L4: Self = Self::hundredths(750);
+    pub const L4: Self = Self::from_hundredths(750);
     /// Level L5, an exposure drop of 9 EV.
-    pub const L5: Self = Self::hundredths(900);
+    pub const L5: Self = Self::from_hundredths(900);
     /// The exposure drops of the paper (DarkQA, section III), smallest first.
     pub const LADDER: [Self; 5] = [Self::L1, Self::L2, Self::L3, Self::L4, Self::L5];
-    /// Exposure times in milliseconds: 1/120 s, half a frame of a video with 60 frames a second, doubled four times; chosen.
+    /// Exposure times in milliseconds: 1/120 s (half the frame interval of 60 fps video) and its doubles up to 2/15 s; chosen.
     pub const TIMES: [Self; 5] = [
-        Self::hundredths(833),
-        Self::hundredths(1667),
-        Self::hundredths(3333),
-        Self::hundredths(6667),
-        Self::hundredths(13333),
+        Self::from_hundredths(833),
+        Self::from_hundredths(1667),
+        Self::from_hundredths(3333),
+        Self::from_hundredths(6667),
+        Self::from_hundredths(13333),
     ];
 
     /// A severity in hundredths of the kind's unit; 0 becomes 1, because a severity is never zero.
     #[must_use]
-    pub const fn hundredths(count: u16) -> Self {
+    pub const fn from_hundredths(count: u16) -> Self {
         match NonZeroU16::new(count) {
             Some(count) => Self(count),
             None => Self(NonZeroU16::MIN),
@@ -93,7 +93,7 @@ impl Severity {
 
     /// The severity in hundredths of the kind's unit.
     #[must_use]
-    pub const fn in_hundredths(self) -> u16 {
+    pub const fn hundredths(self) -> u16 {
         self.0.get()
     }
 
@@ -120,11 +120,13 @@ impl Serialize for Severity {
 impl FromStr for Severity {
     type Err = Error;
 
-    /// Reads a decimal number above 0 with at most two decimals.
+    /// Parses a decimal number above 0 with at most two decimals.
     fn from_str(text: &str) -> Result<Self, Error> {
         let (whole, part) = text.split_once('.').unwrap_or((text, "0"));
-        let digits = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
-        if !digits(whole) || !digits(part) {
+        let is_decimal = [whole, part]
+            .iter()
+            .all(|digits| !digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit()));
+        if !is_decimal {
             let problem = format_args!("{text:?} is not a decimal number like 3.3");
             return Err(Error::usage("level", problem));
         }
@@ -132,8 +134,9 @@ impl FromStr for Severity {
             let problem = format_args!("{text:?} has more than two decimals");
             return Err(Error::usage("level", problem));
         }
-        let count = format!("{whole}{part:0<2}").parse::<u16>().ok();
-        count
+        format!("{whole}{part:0<2}")
+            .parse::<u16>()
+            .ok()
             .and_then(NonZeroU16::new)
             .map(Self)
             .ok_or_else(|| Error::usage("level", format_args!("{text:?} is 0 or too large")))

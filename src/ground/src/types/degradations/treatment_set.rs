@@ -1,4 +1,4 @@
-//! The images that enhancers work on: [`TreatmentSet`].
+//! The choice of images that are enhanced: [`TreatmentSet`].
 
 use std::fmt;
 use std::str::FromStr;
@@ -25,13 +25,13 @@ impl TreatmentSet {
     /// No treatment.
     const NONE: Self = Self(0);
 
-    /// Sensor noise, the images that enhancers work on if nothing else is said.
+    /// Sensor noise: the images that are enhanced by default.
     pub const NOISE: Self = Self::only(Some(Kind::Sensor));
 
     /// Photographs in the dark.
     pub const DARK: Self = Self(1 << 15);
 
-    /// The set of a single treatment; `None` is the untouched frame.
+    /// The set with a single treatment; `None` is the untouched frame.
     #[must_use]
     pub const fn only(treatment: Option<Kind>) -> Self {
         match treatment {
@@ -40,32 +40,32 @@ impl TreatmentSet {
         }
     }
 
-    /// Whether the set includes a treatment; `None` is the untouched frame.
+    /// True if the set includes a kind of degradation, or the untouched frame for `None`.
     #[must_use]
-    pub fn includes(self, treatment: Option<Kind>) -> bool {
-        self.0 & Self::only(treatment).0 != 0
+    pub fn includes_kind(self, kind: Option<Kind>) -> bool {
+        self.0 & Self::only(kind).0 != 0
     }
 
-    /// Whether the set includes a treatment of a frame. Synthetic images that are as dark as a photograph belong to their kind.
+    /// True if the set includes a treatment. A synthetic image that matches a photograph counts as its kind.
     #[must_use]
-    pub fn has(self, treatment: &Treatment) -> bool {
+    pub fn includes(self, treatment: &Treatment) -> bool {
         match treatment {
-            Treatment::Untouched => self.includes(None),
-            Treatment::Degraded(how) => self.includes(Some(how.kind())),
-            Treatment::Paired(PairDark::Match(kind, _)) => self.includes(Some(*kind)),
-            Treatment::Paired(PairDark::Photograph(_)) => self.and(Self::DARK).is_some(),
+            Treatment::Untouched => self.includes_kind(None),
+            Treatment::Degraded(how) => self.includes_kind(Some(how.kind())),
+            Treatment::Paired(PairDark::Match(kind, _)) => self.includes_kind(Some(*kind)),
+            Treatment::Paired(PairDark::Photograph(_)) => self.intersection(Self::DARK).is_some(),
         }
     }
 
     /// The treatments that either set includes.
     #[must_use]
-    pub fn or(self, other: Self) -> Self {
+    pub fn union(self, other: Self) -> Self {
         Self(self.0 | other.0)
     }
 
     /// The treatments that both sets include; `None` if there are none.
     #[must_use]
-    pub fn and(self, other: Self) -> Option<Self> {
+    pub fn intersection(self, other: Self) -> Option<Self> {
         let both = self.0 & other.0;
         (both != 0).then_some(Self(both))
     }
@@ -73,8 +73,8 @@ impl TreatmentSet {
     /// All treatments: the untouched frame, every kind of degradation, and photographs in the dark.
     fn all() -> Self {
         let kinds = Kind::ALL.map(|kind| Self::only(Some(kind)));
-        let both = Self::only(None).or(Self::DARK);
-        kinds.into_iter().fold(both, Self::or)
+        let others = Self::only(None).union(Self::DARK);
+        kinds.into_iter().fold(others, Self::union)
     }
 
     /// The set with the two kinds of the paper, `both`.
@@ -84,12 +84,11 @@ impl TreatmentSet {
 
     /// Names of the treatments; the untouched frame comes first.
     fn words(self) -> Vec<&'static str> {
-        let kinds = Kind::ALL.map(Some).into_iter();
         std::iter::once(None)
-            .chain(kinds)
-            .filter(|treatment| self.includes(*treatment))
-            .map(|treatment| treatment.map_or(UNTOUCHED, Kind::word))
-            .chain(self.and(Self::DARK).map(|_| PHOTOGRAPHS))
+            .chain(Kind::ALL.map(Some))
+            .filter(|kind| self.includes_kind(*kind))
+            .map(|kind| kind.map_or(UNTOUCHED, Kind::word))
+            .chain(self.intersection(Self::DARK).map(|_| PHOTOGRAPHS))
             .collect()
     }
 
@@ -117,7 +116,7 @@ impl From<KindSet> for TreatmentSet {
         kinds
             .kinds()
             .map(|kind| Self::only(Some(kind)))
-            .fold(Self::NONE, Self::or)
+            .fold(Self::NONE, Self::union)
     }
 }
 
@@ -137,8 +136,10 @@ impl FromStr for TreatmentSet {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        text.split(',')
-            .try_fold(Self::NONE, |set, word| Ok(set.or(Self::from_word(word)?)))
+        text.split(',').try_fold(
+            Self::NONE,
+            |set, word| Ok(set.union(Self::from_word(word)?)),
+        )
     }
 }
 
@@ -179,18 +180,27 @@ mod tests {
     }
 
     #[test]
-    fn the_default_is_noise_alone() {
+    fn default_is_noise_alone() {
         assert_eq!("noise".parse(), Ok(TreatmentSet::NOISE));
-        assert!(!TreatmentSet::NOISE.includes(None));
-        assert!(!TreatmentSet::NOISE.includes(Some(Kind::Exposure)));
+        assert!(!TreatmentSet::NOISE.includes_kind(None));
+        assert!(!TreatmentSet::NOISE.includes_kind(Some(Kind::Exposure)));
         let both: TreatmentSet = "both".parse().unwrap();
-        assert!(!both.includes(None) && both.includes(Some(Kind::Exposure)));
-        let has = |set: &str, condition: &str| {
+        assert!(!both.includes_kind(None) && both.includes_kind(Some(Kind::Exposure)));
+    }
+
+    #[test]
+    fn sets_include_photographs_and_matches() {
+        for (set, treatment, expected) in [
+            ("noise", "dark", false),
+            ("dark", "dark-2", true),
+            ("all", "lamp", true),
+            ("noise", "match-noise", true),
+            ("dark", "match-noise", false),
+            ("l0", "dark", false),
+        ] {
             let set: TreatmentSet = set.parse().unwrap();
-            let condition: crate::types::Condition = condition.parse().unwrap();
-            set.has(&condition.treatment)
-        };
-        assert!(!has("noise", "dark") && has("dark", "dark-2") && has("all", "lamp"));
-        assert!(has("noise", "match-noise") && !has("dark", "match-noise") && !has("l0", "dark"));
+            let treatment: Treatment = treatment.parse().unwrap();
+            assert_eq!(set.includes(&treatment), expected, "{set} {treatment}");
+        }
     }
 }

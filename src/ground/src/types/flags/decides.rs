@@ -1,4 +1,4 @@
-//! [`Decides`]: the class of a flag by its effect on a run.
+//! [`Decides`]: which part of a run a flag decides.
 
 use clap::Arg;
 use clap::builder::ArgExt;

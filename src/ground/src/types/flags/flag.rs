@@ -16,10 +16,11 @@ const MAX_THREADS: usize = 1024;
 /// Reads a finite number above 0.
 ///
 /// # Errors
-/// The text names the expected value.
+/// If the text is anything else; the error names the expected value.
 pub fn positive(text: &str) -> Result<f64, String> {
-    let value = text.trim().parse().ok();
-    value
+    text.trim()
+        .parse()
+        .ok()
         .filter(|value: &f64| value.is_finite() && *value > 0.0)
         .ok_or_else(|| "a number above 0 expected".to_owned())
 }
@@ -27,12 +28,11 @@ pub fn positive(text: &str) -> Result<f64, String> {
 /// Reads a duration above 0, in seconds.
 ///
 /// # Errors
-/// The text names the expected value.
+/// If the text is anything else; the error names the expected value.
 pub fn seconds(text: &str) -> Result<Duration, String> {
-    let duration = positive(text)
+    positive(text)
         .ok()
-        .and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
-    duration
+        .and_then(|seconds| Duration::try_from_secs_f64(seconds).ok())
         .filter(|duration| !duration.is_zero())
         .ok_or_else(|| "a number of seconds above 0 expected".to_owned())
 }
@@ -40,10 +40,11 @@ pub fn seconds(text: &str) -> Result<Duration, String> {
 /// Reads a number of threads.
 ///
 /// # Errors
-/// The text names the expected value.
+/// If the text is anything else; the error names the expected value.
 pub fn threads(text: &str) -> Result<NonZeroUsize, String> {
-    let threads = text.trim().parse().ok();
-    threads
+    text.trim()
+        .parse()
+        .ok()
         .filter(|threads: &NonZeroUsize| threads.get() <= MAX_THREADS)
         .ok_or_else(|| format!("a number from 1 to {MAX_THREADS} expected"))
 }
@@ -88,7 +89,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_keep_their_limits() {
+    fn numbers_outside_the_limits_are_refused() {
         assert_eq!(positive("0.5"), Ok(0.5));
         assert_eq!(seconds("1.5"), Ok(Duration::from_millis(1500)));
         assert_eq!(threads("1024").map(NonZeroUsize::get), Ok(1024));

@@ -6,10 +6,10 @@ use std::ops::RangeInclusive;
 
 use crate::types::text::near_name::suggestion;
 
-/// The settings in a text, each with its value. A setting that is not named keeps its default.
+/// The settings in a text, each with its value.
 ///
 /// # Errors
-/// If a key is not one of `keys`, with the key that is most like it; or if a key has no value or is named twice.
+/// If a key is not one of `keys` (the error suggests the most similar one), has no value, or occurs twice.
 pub fn pairs<'a>(
     text: &'a str,
     keys: &[&'static str],
@@ -19,7 +19,7 @@ pub fn pairs<'a>(
         let (name, value) = item.split_once('=').unwrap_or((item, ""));
         let (name, value) = (name.trim(), value.trim());
         let Some(key) = keys.iter().find(|key| **key == name) else {
-            return Err(unknown(name, keys));
+            return Err(unknown_key(name, keys));
         };
         if value.is_empty() {
             return Err(format!("{key} has no value; write {key}=VALUE"));
@@ -32,7 +32,7 @@ pub fn pairs<'a>(
     Ok(pairs)
 }
 
-fn unknown(name: &str, keys: &[&str]) -> String {
+fn unknown_key(name: &str, keys: &[&str]) -> String {
     format!(
         "there is no setting {name:?}; the settings are {}{}",
         keys.join(", "),
@@ -40,18 +40,19 @@ fn unknown(name: &str, keys: &[&str]) -> String {
     )
 }
 
-/// The number of a setting, in its unit.
+/// Parses the value of a setting as a number; `unit` is named in the error.
 ///
 /// # Errors
-/// If it is not a number within the limits.
+/// If the value is not a number within the limits.
 pub fn number(
     key: &str,
     value: &str,
     unit: &str,
     limits: RangeInclusive<f64>,
 ) -> Result<f64, String> {
-    let number = value.parse().ok();
-    number
+    value
+        .parse()
+        .ok()
         .filter(|number| limits.contains(number))
         .ok_or_else(|| {
             let (low, high) = limits.into_inner();
@@ -90,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_keep_their_limits() {
+    fn numbers_outside_the_limits_are_refused() {
         assert_eq!(
             number("speed", "0.5", "degrees per second", 0.0..=9.0),
             Ok(0.5)

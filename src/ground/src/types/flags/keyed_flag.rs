@@ -11,11 +11,11 @@ pub struct KeyedFlag {
     pub name: &'static str,
     /// The heading of the flag in the help.
     pub heading: &'static str,
-    /// The help; empty if the flag has a value without a key, whose own help stands first.
+    /// The help text; empty if the flag has a value without a key, whose own help text is used.
     pub about: &'static str,
-    /// The value of a key that stands alone; `None` if a key alone is a switch, or has only one possible value.
+    /// The value of a key that is written without a value; `None` if such a key is a switch or has only one possible value.
     pub alone: Option<&'static str>,
-    /// Each key with the name of the hidden flag that sets the same. The key of a value without a key is empty.
+    /// Each key with the name of the hidden flag for the same setting. The empty key is for a value without a key.
     pub keys: &'static [(&'static str, &'static str)],
 }
 
@@ -24,11 +24,11 @@ pub struct KeyedFlag {
 pub struct KeyedSetting {
     /// The name of the hidden flag.
     pub flag: &'static str,
-    /// The value; `None` for a key alone.
+    /// The value; `None` for a key without a value.
     pub value: Option<String>,
 }
 
-/// All keyed flags. A command takes those for whose keys it has hidden flags.
+/// All keyed flags. A command has a keyed flag if it has hidden flags for any of the keys.
 pub const KEYED_FLAGS: [KeyedFlag; 14] = [
     KeyedFlag {
         name: "noise",
@@ -192,7 +192,7 @@ pub const KEYED_FLAGS: [KeyedFlag; 14] = [
     },
 ];
 
-/// The keyed flag that sets the same as a hidden flag, and the key in it: `noise` and `gain` for `gain`.
+/// The keyed flag and the key that replace a hidden flag: `noise` and `gain` for `gain`.
 #[must_use]
 pub fn keyed_form(flag: &str) -> Option<(&'static KeyedFlag, &'static str)> {
     KEYED_FLAGS.iter().find_map(|keyed| {
@@ -206,21 +206,23 @@ pub fn keyed_form(flag: &str) -> Option<(&'static KeyedFlag, &'static str)> {
 
 /// The spelling of a flag in messages: `--noise gain` for `gain`, `--model` for `model`.
 #[must_use]
-pub fn spelled(flag: &str) -> String {
+pub fn flag_spelling(flag: &str) -> String {
     match keyed_form(flag) {
         Some((keyed, key)) => format!("--{} {key}", keyed.name),
         None => format!("--{flag}"),
     }
 }
 
-/// The name of a setting in a manifest for a message: `--noise camera or fixed` for `--camera or --fixed`.
+/// Rewrites the hidden flags in a manifest's name of a setting as keys, for messages: `--camera or --fixed` becomes
+/// `--noise camera or fixed`.
 #[must_use]
-pub fn spelled_setting(setting: &str) -> String {
-    let is_name = |c: char| c == '-' || c.is_ascii_alphanumeric();
+pub fn setting_spelling(setting: &str) -> String {
     let (mut spelling, mut last) = (String::new(), "");
     for word in setting.split_inclusive(' ') {
         let name = word.strip_prefix("--").unwrap_or_default();
-        let end = name.find(|c| !is_name(c)).unwrap_or(name.len());
+        let end = name
+            .find(|c: char| c != '-' && !c.is_ascii_alphanumeric())
+            .unwrap_or(name.len());
         let (flag, rest) = name.split_at(end);
         match keyed_form(flag) {
             Some((keyed, key)) if keyed.name == last => spelling.extend([key, rest]),
@@ -237,48 +239,42 @@ pub fn spelled_setting(setting: &str) -> String {
 impl KeyedFlag {
     /// The keyed flag with this name.
     #[must_use]
-    pub fn named(name: &str) -> Option<&'static Self> {
+    pub fn from_name(name: &str) -> Option<&'static Self> {
         KEYED_FLAGS.iter().find(|keyed| keyed.name == name)
     }
 
-    /// Whether it has a value without a key.
+    /// True if the flag has a value without a key.
     #[must_use]
     pub fn has_plain_value(&self) -> bool {
         self.keys.iter().any(|(key, _)| key.is_empty())
     }
 
-    /// Parses a text such as `gain=3,fixed`; `has` tells which hidden flags the command has.
+    /// Parses a text such as `gain=3,fixed`; `has` returns true for the hidden flags of the command.
     ///
-    /// A text without any of the keys is the value without a key, whatever commas it has.
+    /// A text that contains none of the keys is the value without a key, even if it contains commas.
     ///
     /// # Errors
-    /// The text names a key that does not exist, or a part that is empty.
+    /// If a key does not exist or a part is empty.
     pub fn settings(
         &self,
         text: &str,
         has: impl Fn(&str) -> bool,
     ) -> Result<Vec<KeyedSetting>, String> {
-        let known = self.keys.iter().filter(|(_, flag)| has(flag));
-        let (plain, known): (Vec<_>, Vec<_>) = known.partition(|(key, _)| key.is_empty());
-        let keyed = |part: &str| {
-            let (key, value) = match part.split_once('=') {
-                Some((key, value)) => (key.trim(), Some(value.trim().to_owned())),
-                None => (part.trim(), None),
-            };
-            let (_, flag) = known.iter().find(|(own, _)| *own == key)?;
-            Some(KeyedSetting { flag, value })
-        };
+        let (plain, known): (Vec<_>, Vec<_>) = self
+            .keys
+            .iter()
+            .filter(|(_, flag)| has(flag))
+            .partition(|(key, _)| key.is_empty());
         let parts: Vec<&str> = text.split(',').collect();
         let names: Vec<&str> = known.iter().map(|(key, _)| *key).collect();
-        let name = |part: &str| part.split('=').next().unwrap_or_default().trim().to_owned();
         // A part after the first that is nearly a key is a mistyped key.
         let is_mistyped = parts
             .iter()
             .skip(1)
-            .any(|part| names.iter().any(|key| is_nearly(&name(part), key)));
+            .any(|part| names.iter().any(|key| is_nearly(key_of(part), key)));
         if let [(_, flag)] = plain[..]
             && !is_mistyped
-            && parts.iter().all(|part| keyed(part).is_none())
+            && parts.iter().all(|part| !names.contains(&key_of(part)))
         {
             let value = Some(text.to_owned());
             return Ok(vec![KeyedSetting { flag, value }]);
@@ -287,15 +283,17 @@ impl KeyedFlag {
             .iter()
             .enumerate()
             .map(|(place, part)| {
-                if let Some(setting) = keyed(part) {
-                    return Ok(setting);
+                let key = key_of(part);
+                if let Some((_, flag)) = known.iter().find(|(own, _)| *own == key) {
+                    let value = part.split_once('=');
+                    let value = value.map(|(_, value)| value.trim().to_owned());
+                    return Ok(KeyedSetting { flag, value });
                 }
                 if let (0, [(_, flag)]) = (place, &plain[..]) {
                     let value = Some((*part).to_owned());
                     return Ok(KeyedSetting { flag, value });
                 }
-                let key = name(part);
-                let near = match suggestion(&key, &names) {
+                let near = match suggestion(key, &names) {
                     near if near.is_empty() => format!("; keys: {}", names.join(", ")),
                     near => near,
                 };
@@ -305,12 +303,17 @@ impl KeyedFlag {
     }
 }
 
+/// The key of a part such as `gain=3` or `fixed`.
+fn key_of(part: &str) -> &str {
+    part.split_once('=').map_or(part, |(key, _)| key).trim()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn settings(flag: &str, text: &str) -> Result<Vec<(&'static str, Option<String>)>, String> {
-        let keyed = KeyedFlag::named(flag).unwrap();
+        let keyed = KeyedFlag::from_name(flag).unwrap();
         Ok(keyed
             .settings(text, |_| true)?
             .into_iter()
@@ -323,7 +326,7 @@ mod tests {
     }
 
     #[test]
-    fn keys_have_values_or_stand_alone() {
+    fn keys_may_have_no_value() {
         assert_eq!(
             settings("noise", "gain=3, fixed,camera=a=b.toml"),
             Ok(vec![
@@ -335,7 +338,7 @@ mod tests {
     }
 
     #[test]
-    fn a_plain_value_stands_first() {
+    fn plain_value_may_come_first() {
         assert_eq!(
             settings("image", "jpeg:90,max-side=512,first"),
             Ok(vec![
@@ -375,7 +378,7 @@ mod tests {
 
     #[test]
     fn a_key_of_another_command_is_unknown() {
-        let keyed = KeyedFlag::named("request").unwrap();
+        let keyed = KeyedFlag::from_name("request").unwrap();
         let problem = keyed.settings("constrain=json", |flag| flag != "constrain");
         assert!(
             problem
@@ -386,9 +389,9 @@ mod tests {
 
     #[test]
     fn hidden_flags_are_spelled_as_keys() {
-        assert_eq!(spelled("gain"), "--noise gain");
-        assert_eq!(spelled("image"), "--image");
-        assert_eq!(spelled("model"), "--model");
+        assert_eq!(flag_spelling("gain"), "--noise gain");
+        assert_eq!(flag_spelling("image"), "--image");
+        assert_eq!(flag_spelling("model"), "--model");
     }
 
     #[test]
@@ -403,7 +406,7 @@ mod tests {
             ("--levels of the run --", "--levels of the run --"),
             ("the version", "the version"),
         ] {
-            assert_eq!(spelled_setting(setting), spelling);
+            assert_eq!(setting_spelling(setting), spelling);
         }
     }
 }

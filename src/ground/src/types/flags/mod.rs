@@ -1,4 +1,4 @@
-//! Flags: parsers of their values, and their effect on a run.
+//! Command-line flags: parsers of their values, and their effect on a run.
 
 #[cfg(feature = "program")]
 mod decides;
@@ -11,4 +11,6 @@ mod keyed_flag;
 pub use decides::Decides;
 #[cfg(feature = "program")]
 pub use flag::{flag_words, positive, read_word, seconds, threads, write_word};
-pub use keyed_flag::{KEYED_FLAGS, KeyedFlag, KeyedSetting, keyed_form, spelled, spelled_setting};
+pub use keyed_flag::{
+    KEYED_FLAGS, KeyedFlag, KeyedSetting, flag_spelling, keyed_form, setting_spelling,
+};

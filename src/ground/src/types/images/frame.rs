@@ -20,7 +20,7 @@ use super::labels::SegmentName;
 pub struct FrameId(pub String);
 
 impl FrameId {
-    /// The name without the ending of an image file, if it has one.
+    /// The name without the extension of an image file, if it has one.
     #[must_use]
     pub fn bare(&self) -> &str {
         match self.0.rsplit_once('.') {
@@ -40,13 +40,14 @@ impl fmt::Display for FrameId {
     }
 }
 
-/// The endings of the names of image files that are read, in lower case.
+/// The extensions of supported image files, in lower case.
 const IMAGE_ENDINGS: [&str; 8] = ["png", "jpg", "jpeg", "webp", "tif", "tiff", "bmp", "exr"];
 
 /// True if the extension, in any case, is that of a supported image format.
 pub fn is_image_ending(ending: &str) -> bool {
-    let mut known = IMAGE_ENDINGS.iter();
-    known.any(|known| ending.eq_ignore_ascii_case(known))
+    IMAGE_ENDINGS
+        .iter()
+        .any(|known| ending.eq_ignore_ascii_case(known))
 }
 
 /// One view of a scene: an image and, if the data set has them, its maps of the same height and width.
@@ -69,7 +70,7 @@ pub struct Frame {
     pub semantic: Option<Array2<u16>>,
     /// The segment of each pixel, 0 for none.
     pub segments: Option<Array2<u32>>,
-    /// Whether a segment is an object or a part of one.
+    /// Whether a segment is a whole object or a part of one.
     pub segmentation: Segmentation,
     /// The names of the scene's segments, by segment; some may be missing.
     pub names: Arc<BTreeMap<u32, SegmentName>>,
@@ -96,7 +97,7 @@ pub enum Segmentation {
     /// Each object is one segment.
     #[default]
     Instances,
-    /// A segment is a part of an object, as superpixels are: neighbours of one class belong together.
+    /// A segment may be a part of an object, such as a superpixel; neighbouring segments of one class are one object.
     Parts,
 }
 
@@ -118,7 +119,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_ending_of_an_image_file_is_not_part_of_the_name() {
+    fn bare_name_has_no_image_extension() {
         for (name, bare) in [
             ("a/b.PNG", "a/b"),
             ("a.b.jpeg", "a.b"),

@@ -1,10 +1,10 @@
-//! Images of three channels, by the depth of their samples: [`Rgb`], [`Rgb16Image`] and [`Light`].
+//! Images of three channels: 8-bit codes ([`Rgb`]), 16-bit codes ([`Rgb16Image`]) and linear light ([`Light`]).
 
 use std::fmt;
 
 use crate::error::Error;
 
-/// An image, height × width × 3 samples, at least one pixel.
+/// An image of height × width × 3 samples and at least one pixel.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Image<T> {
     height: usize,
@@ -20,19 +20,18 @@ pub type Rgb16Image = Image<u16>;
 
 /// Linear light of an image, with the primaries of sRGB; black is 0, white is 1.
 ///
-/// It is either the light of a scene, or the light that the display shows for codes: their gamma is undone, the tone curve of the
-/// camera is not.
+/// Either the light of a scene, or the light that a display emits for codes: their gamma is undone, the tone curve of the camera is not.
 pub type Light = Image<f32>;
 
 /// A sample of an [`Image`].
 pub trait Sample: Copy + Default + fmt::Display {
-    /// The image in words, for messages.
+    /// Description of such an image, for messages.
     const IMAGE: &str;
-    /// The name of the type of images.
+    /// Name of the image type, for `Debug`.
     const NAME: &str;
 
-    /// Whether an image may hold the sample.
-    fn is_possible(self) -> bool {
+    /// True if the value is allowed in an image.
+    fn is_valid(self) -> bool {
         true
     }
 }
@@ -51,30 +50,33 @@ impl Sample for f32 {
     const IMAGE: &str = "image of light";
     const NAME: &str = "Light";
 
-    fn is_possible(self) -> bool {
+    fn is_valid(self) -> bool {
         self.is_finite() && self >= 0.0
     }
 }
 
 impl<T: Sample> Image<T> {
-    /// Takes height × width × 3 samples, row by row, red first.
+    /// An image from height × width × 3 samples, row by row, red first.
     ///
     /// # Errors
     /// If the number of samples is not `height * width * 3`, or is zero, or a sample of light is not a finite number of at least 0.
     pub fn new(height: usize, width: usize, samples: Vec<T>) -> Result<Self, Error> {
-        let wrong = |problem: fmt::Arguments<'_>| Error::data("image", problem);
         let found = samples.len();
         let expected = height.checked_mul(width).and_then(|n| n.checked_mul(3));
         if found == 0 || expected != Some(found) {
             let image = T::IMAGE;
-            return Err(wrong(format_args!(
-                "{found} samples do not make a {height} × {width} {image}"
-            )));
+            return Err(Error::data(
+                "image",
+                format_args!("{found} samples do not make a {height} × {width} {image}"),
+            ));
         }
-        if let Some(sample) = samples.iter().find(|sample| !sample.is_possible()) {
-            return Err(wrong(format_args!(
-                "{sample} is not an amount of light; expected a finite number of at least 0"
-            )));
+        if let Some(sample) = samples.iter().find(|sample| !sample.is_valid()) {
+            return Err(Error::data(
+                "image",
+                format_args!(
+                    "{sample} is not an amount of light; expected a finite number of at least 0"
+                ),
+            ));
         }
         Ok(Self {
             height,
@@ -112,7 +114,7 @@ impl<T: Sample> Image<T> {
         &self.samples
     }
 
-    /// The samples of an image that is no longer needed.
+    /// Converts the image into its samples.
     #[must_use]
     pub fn into_samples(self) -> Vec<T> {
         self.samples

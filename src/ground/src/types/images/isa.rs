@@ -4,9 +4,9 @@
 //! IEEE 754 (no fused multiply-add, no reordering) and of integers. So each instruction set gives the same bits, which
 //! tests check.
 
-/// A computation that is compiled once for each [`Isa`].
+/// A computation that is compiled separately for each [`Isa`].
 pub trait Kernel {
-    /// Does the computation. This and all that it calls must be `#[inline(always)]`: only inlined code is compiled for the
+    /// Runs the computation. This method and all functions that it calls must be `#[inline(always)]`: only inlined code is compiled for the
     /// caller's instruction set.
     fn run(self);
 }
@@ -53,7 +53,10 @@ impl Isa {
     }
 
     /// Runs a kernel with this instruction set, or with the baseline if the machine does not have it.
-    #[expect(unsafe_code, reason = "only the check before it makes the call sound")]
+    #[expect(
+        unsafe_code,
+        reason = "the match guards check the CPU feature before each call"
+    )]
     pub fn run(self, kernel: impl Kernel) {
         match self {
             // SAFETY: the machine has the instructions that the function is compiled for.

@@ -1,4 +1,4 @@
-//! The meaning of the numbers in a frame's maps: [`Labels`], [`SegmentName`].
+//! Class names of the numbers in semantic and segment maps: [`Labels`], [`SegmentName`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::types::values::Digest;
 
-/// Suffixes of HM3D-Sem's words for things seen through a door or a window: they give the place, not the thing.
+/// Suffixes in HM3D-Sem's names of objects seen through a door or window. They name the place of the object, not its class.
 pub const OTHER_PLACES: [&str; 5] = [
     "/otherroom",
     "/ otherroom",
@@ -15,7 +15,7 @@ pub const OTHER_PLACES: [&str; 5] = [
     "/ outside",
 ];
 
-/// The class that one number of a semantic map stands for.
+/// The class of one number in a semantic map.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Label {
     /// The name in the data set, as `night stand`.
@@ -33,8 +33,8 @@ pub struct Labels {
     pub void: BTreeSet<u16>,
     /// The class of each number.
     pub labels: BTreeMap<u16, Label>,
-    /// The canonical classes that are absent from an image if they are absent from its map. A class without its own label may
-    /// be labelled with a general class, as sinks are labelled `objects` in NYU13.
+    /// The canonical classes with a label of their own: if the map does not contain one, neither does the image. A class that is not in
+    /// this set may be present under a more general label, as sinks are labelled `objects` in NYU13.
     pub expressible: BTreeSet<String>,
 }
 

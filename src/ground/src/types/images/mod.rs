@@ -1,11 +1,11 @@
 //! Images, frames with their maps, and pixels.
 
+mod display_codes;
 mod frame;
 mod image;
 mod isa;
 mod labels;
 mod pixels;
-mod shown_codes;
 
 #[cfg(feature = "program")]
 pub use frame::Frame;

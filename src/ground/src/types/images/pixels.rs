@@ -1,17 +1,18 @@
-//! The pixels of a clean frame in the depth in which they are known: [`Pixels`].
+//! The pixels of a clean frame in the bit depth of its file: [`Pixels`].
 
 use std::sync::Arc;
 
+use super::display_codes::{from_linear, from_rgb16};
 use super::image::{Light, Rgb, Rgb16Image};
-use super::shown_codes::{from_linear, from_rgb16};
-/// The pixels of a clean frame. A copy shares them.
+
+/// The pixels of a clean frame in the bit depth of its file. Clones share the pixels.
 #[derive(Debug, Clone)]
 pub enum Pixels {
     /// 8-bit sRGB codes.
     Codes8(Arc<Rgb>),
     /// 16-bit sRGB codes.
     Rgb16Image(Arc<Rgb16Image>),
-    /// Linear light of the scene, with the primaries of sRGB. White is 1, and light may be more.
+    /// Linear light of the scene, with the primaries of sRGB. White is 1; brighter light is above 1.
     Light(Arc<Light>),
 }
 
@@ -36,7 +37,7 @@ impl Pixels {
         }
     }
 
-    /// The 8-bit codes of the frame as it is shown undarkened: L0.
+    /// The 8-bit codes of the undarkened frame, L0.
     #[must_use]
     pub fn codes(&self) -> Arc<Rgb> {
         match self {

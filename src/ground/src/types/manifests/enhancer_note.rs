@@ -6,25 +6,25 @@ use serde::{Deserialize, Serialize};
 
 use crate::types::{Flaw, SizeLog};
 
-/// Key of the statement that images were enhanced elsewhere.
+/// Sidecar key: the images were enhanced by another program.
 pub const ELSEWHERE: &str = "enhanced";
 
-/// Key of the statement of the data that the model was trained on.
+/// Sidecar key: the data that the model was trained on.
 pub const TRAINED_ON: &str = "trained_on";
 
-/// How a run used an enhancer, and whether its images can be enhanced images.
+/// How a run used an enhancer, and whether its images are plausible as enhanced images.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct EnhancerNote {
-    /// How the model is fed and read.
+    /// Conventions for the model's input and output.
     #[serde(default)]
     pub convention: Vec<ConventionLine>,
     /// How image sizes were adapted to the model, in words; empty before the first image.
     #[serde(default)]
     pub sizes: String,
-    /// The counts behind these words. An image that was enhanced again, after an interruption, counts again.
+    /// The counts behind `sizes`. An image that was enhanced again after an interruption counts twice.
     #[serde(default)]
     pub size_counts: SizeLog,
-    /// True if an image was resized for the model: the results are then not those of the model at the image's own size.
+    /// True if an image was resized for the model, so that the results are not those at the image's own size.
     #[serde(default)]
     pub resized: bool,
     /// Findings of the probe before the first question; `None` if it was not run.
@@ -38,7 +38,7 @@ pub struct EnhancerNote {
     pub judged: JudgedImages,
 }
 
-/// One statement of how a model is fed or read.
+/// One convention for a model's input or output.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ConventionLine {
     /// The key of the sidecar, or a fact of the graph.
@@ -52,9 +52,9 @@ pub struct ConventionLine {
 /// Result of probing an enhancer.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ProbeNote {
-    /// The number of dark frames.
+    /// The number of dark frames that were enhanced.
     pub frames: usize,
-    /// The value ranges with which its images can be enhanced images.
+    /// The output value ranges with which the images are plausible.
     pub plausible: Vec<String>,
     /// The problem found; `None` if there was none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -67,23 +67,23 @@ pub struct ProbeNote {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ProbeOutcome {
-    /// The images can be enhanced images.
+    /// The images are plausible as enhanced images.
     Plausible,
-    /// The images are odd, but the user states how the model is fed and read, and some models do that.
+    /// The images are unusual. They are accepted, because some models produce such images and the user stated the conventions.
     Doubtful,
-    /// The images cannot be enhanced images; the run went on because the user said so.
+    /// The images are implausible; the run continued because the user overruled the probe.
     Overruled,
 }
 
-/// The enhanced images of dark frames that were looked at, and those with a flaw.
+/// Counts of the enhanced images of dark frames that were checked, and of those with a flaw.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct JudgedImages {
-    /// The number of images.
+    /// The number of images that were checked.
     pub images: usize,
     /// The numbers of images with a flaw, by flaw.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub flawed: BTreeMap<Flaw, usize>,
-    /// The first of them, at most [`JudgedImages::EXAMPLES`].
+    /// The first images with a flaw in sorted order, at most [`JudgedImages::EXAMPLES`].
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub examples: Vec<FlawedImage>,
 }
@@ -100,16 +100,16 @@ pub struct FlawedImage {
 }
 
 impl EnhancerNote {
-    /// Data that the model was trained on; `None` if nobody stated them.
+    /// Data that the model was trained on; `None` if the sidecar does not state them.
     #[must_use]
     pub fn trained_on(&self) -> Option<&str> {
         let line = self.convention.iter().find(|line| line.key == TRAINED_ON)?;
         Some(&line.value)
     }
 
-    /// The note of a run that used the enhancer before, with this one for what came later.
+    /// Merges the note of an earlier session of the run into this one.
     #[must_use]
-    pub fn after(mut self, earlier: Option<Self>) -> Self {
+    pub fn with_earlier(mut self, earlier: Option<Self>) -> Self {
         let Some(earlier) = earlier else { return self };
         self.judged.add(&earlier.judged);
         self.resized |= earlier.resized;
@@ -145,13 +145,13 @@ impl JudgedImages {
         self.images += 1;
         let Some(image) = flawed else { return };
         *self.flawed.entry(image.flaw).or_default() += 1;
-        // The same examples whatever the order of the images.
+        // Sorted, so that the examples do not depend on the order of the images.
         let place = self.examples.partition_point(|known| *known < image);
         self.examples.insert(place, image);
         self.examples.truncate(Self::EXAMPLES);
     }
 
-    /// Adds the images of an earlier command or of another part.
+    /// Adds the counts of an earlier command or of another shard.
     pub fn add(&mut self, other: &Self) {
         self.images += other.images;
         for (flaw, count) in &other.flawed {
@@ -178,31 +178,32 @@ mod tests {
 
     #[test]
     fn sizes_of_all_sessions_are_counted() {
-        let note = |whole: usize, reduced: usize| {
-            let counts = SizeLog {
-                images: whole + reduced,
-                whole,
-                reduced,
-                ..SizeLog::default()
-            };
-            EnhancerNote {
-                sizes: counts.summary(),
-                size_counts: counts,
-                ..EnhancerNote::default()
-            }
-        };
-        let earlier = || Some(note(9, 0));
-        let both = note(31, 2).after(earlier());
+        let both = note(31, 2).with_earlier(Some(note(9, 0)));
         assert_eq!(both.size_counts, note(40, 2).size_counts);
         assert_eq!(both.sizes, note(40, 2).sizes);
         // A session without images keeps the earlier counts.
-        assert_eq!(EnhancerNote::default().after(earlier()), note(9, 0));
+        let empty = EnhancerNote::default();
+        assert_eq!(empty.with_earlier(Some(note(9, 0))), note(9, 0));
         // A manifest of an earlier version has the words alone.
         let words = EnhancerNote {
             sizes: "9 images: as they are".to_owned(),
             ..EnhancerNote::default()
         };
-        assert_eq!(note(31, 0).after(Some(words)), note(31, 0));
+        assert_eq!(note(31, 0).with_earlier(Some(words)), note(31, 0));
+    }
+
+    fn note(whole: usize, reduced: usize) -> EnhancerNote {
+        let counts = SizeLog {
+            images: whole + reduced,
+            whole,
+            reduced,
+            ..SizeLog::default()
+        };
+        EnhancerNote {
+            sizes: counts.summary(),
+            size_counts: counts,
+            ..EnhancerNote::default()
+        }
     }
 
     #[test]

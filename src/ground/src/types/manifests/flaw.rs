@@ -8,9 +8,9 @@ use crate::types::text::words::words;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Flaw {
-    /// Values that are not numbers.
+    /// Values that are NaN.
     Nan,
-    /// Values far outside the range in which they are read.
+    /// Values far outside the expected range.
     Range,
     /// No structure.
     Flat,
@@ -20,7 +20,7 @@ pub enum Flaw {
     White,
     /// Bright where the frame is dark.
     Inverted,
-    /// Edges that are not the frame's.
+    /// Edges that differ from those of the frame.
     Shuffled,
     /// Blue where the frame is red.
     Hue,

@@ -7,16 +7,16 @@ use serde::{Deserialize, Serialize};
 use crate::types::images::FrameId;
 use crate::types::values::Digest;
 
-/// Version of the conversion of colours, raised whenever a code changes.
+/// Version of the colour conversion, raised whenever it produces another pixel value.
 const COLOUR_VERSION: u32 = 1;
 
 /// Changes made to one image when it was read. By default its codes were used unchanged.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct InputNote {
-    /// The EXIF orientation by which the image was turned: 2 to 8.
+    /// The EXIF orientation, 2 to 8, that was applied to the image.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub orientation: Option<u8>,
-    /// The EXIF orientation by which the image was not turned, because its maps have the size of the image as stored.
+    /// The EXIF orientation that was not applied, because the maps have the size of the image as stored.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub orientation_ignored: Option<u8>,
     /// Kind of the file, as `animated WebP`, if it has several pictures; only the first was read.
@@ -28,10 +28,10 @@ pub struct InputNote {
     /// The depth of the pixels, if it is more than 8 bits.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depth: Option<DepthNote>,
-    /// By how many EV the light was scaled; `None` if it was not.
+    /// Scaling of the light, in EV; `None` if it was not scaled.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exposure_ev: Option<f32>,
-    /// The flags for linear light that do not apply, because the image has codes.
+    /// The flags for linear light that had no effect, because the image has integer codes.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub no_light: Vec<String>,
 }
@@ -70,7 +70,7 @@ pub enum ColourHandling {
 }
 
 impl InputNote {
-    /// All that makes the pixels other than the codes of the file, as one text; `None` if they are the same.
+    /// Description of every change of the pixels, as one text for digests; `None` if the pixels are the codes of the file.
     #[must_use]
     pub fn rule(&self) -> Option<String> {
         let orientation = self.orientation.map(|turn| format!("orientation {turn}"));
@@ -88,7 +88,7 @@ impl InputNote {
         (!parts.is_empty()).then(|| parts.join("; "))
     }
 
-    /// The changes, for messages; empty if there were none.
+    /// Each change with its details, for messages.
     fn remarks(&self) -> Vec<(Remark, String)> {
         let mut remarks = Vec::new();
         if let Some(orientation) = self.orientation {
@@ -129,19 +129,19 @@ impl DepthNote {
     }
 }
 
-/// One kind of what reading does to images.
+/// A change that is made to an image when it is read, or a change that was left out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum Remark {
-    /// Turned as the file states.
+    /// EXIF orientation applied.
     Turned,
-    /// Not turned, although the file states it: the maps of the image are not turned either.
+    /// EXIF orientation not applied, because the maps of the image are not rotated either.
     NotTurned,
     /// The first picture of a file that has several.
     FirstOfSeveral,
     /// Converted to sRGB.
     Converted,
-    /// Taken as sRGB, although the file states other colours.
+    /// Interpreted as sRGB, although the file states another colour space.
     NotConverted,
     /// Kept in more than 8 bits.
     Deep,
@@ -178,12 +178,12 @@ impl Remark {
 #[serde(transparent)]
 pub struct InputSummary(BTreeMap<Remark, RemarkCount>);
 
-/// The images to which one thing was done.
+/// The images with one remark.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub(super) struct RemarkCount {
-    /// The numbers of images, by what exactly was done.
+    /// The numbers of images, by the detail of the remark.
     pub images: BTreeMap<String, usize>,
-    /// The first of them by name.
+    /// The first of these images by name.
     pub example: String,
 }
 
@@ -193,28 +193,28 @@ impl InputSummary {
         for (remark, detail) in note.remarks() {
             let count = self.0.entry(remark).or_default();
             *count.images.entry(detail).or_default() += 1;
-            count.name(&frame.0);
+            count.keep_first_name(&frame.0);
         }
     }
 
-    /// Adds the images of another part of a run.
-    pub fn join(&mut self, other: &Self) {
+    /// Adds the images of another shard.
+    pub fn merge(&mut self, other: &Self) {
         for (remark, others) in &other.0 {
             let count = self.0.entry(*remark).or_default();
             for (detail, images) in &others.images {
                 *count.images.entry(detail.clone()).or_default() += images;
             }
-            count.name(&others.example);
+            count.keep_first_name(&others.example);
         }
     }
 
-    /// Whether the codes of all images were taken as they are.
+    /// True if all images were used unchanged.
     #[must_use]
     pub fn is_plain(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// One sentence for each thing that was done, without a full stop.
+    /// One sentence for each kind of remark, without a full stop.
     pub fn lines(&self) -> impl Iterator<Item = String> {
         self.0.iter().map(|(remark, count)| {
             let found: usize = count.images.values().sum();
@@ -236,7 +236,7 @@ impl InputSummary {
 
 impl RemarkCount {
     /// Keeps the first name in alphabetical order, so that the example does not depend on the order of the images.
-    fn name(&mut self, name: &str) {
+    fn keep_first_name(&mut self, name: &str) {
         if self.example.is_empty() || name < self.example.as_str() {
             name.clone_into(&mut self.example);
         }
@@ -255,7 +255,7 @@ mod tests {
     }
 
     #[test]
-    fn images_are_counted_by_what_was_done() {
+    fn images_are_counted_by_remark() {
         let mut summary = InputSummary::default();
         let images = [("c", turned(6)), ("b", turned(8)), ("d", turned(6))];
         for (name, note) in &images {
@@ -266,8 +266,8 @@ mod tests {
         let expected = "3 images are turned as the EXIF orientation of the file states (orientation 6: 2, orientation 8: 1; for example b)";
         assert_eq!(lines, [expected]);
         let mut parts = InputSummary::default();
-        parts.join(&summary);
-        parts.join(&InputSummary::default());
+        parts.merge(&summary);
+        parts.merge(&InputSummary::default());
         assert_eq!(parts, summary);
         parts.add(&FrameId("e".to_owned()), &turned(3));
         assert!(parts.lines().all(|line| line.starts_with("4 images")));
@@ -276,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_said_of_images_that_are_taken_as_they_are() {
+    fn unchanged_images_have_no_remark() {
         let mut summary = InputSummary::default();
         summary.add(&FrameId("a".to_owned()), &InputNote::default());
         assert!(summary.is_plain());

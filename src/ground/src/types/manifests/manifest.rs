@@ -1,4 +1,4 @@
-//! The description of a run: [`RunManifest`].
+//! [`RunManifest`]: the content of a run's `manifest.json`.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -37,7 +37,7 @@ impl fmt::Display for Status {
     }
 }
 
-/// The number of trials of a run, and of those with and without a reply.
+/// Numbers of a run's trials: all, with a reply, and failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Counts {
     /// The number of all trials.
@@ -49,7 +49,7 @@ pub struct Counts {
 }
 
 impl Counts {
-    /// Counts the trials; `failed` has one entry for each stored trial.
+    /// Counts the trials; `failed` has one entry for each stored trial, true if it failed.
     #[must_use]
     pub fn new(trials: usize, failed: impl IntoIterator<Item = bool>) -> Self {
         let (mut all, mut failures) = (0, 0);
@@ -71,20 +71,20 @@ pub fn differences<'a>(
     other: &'a BTreeMap<String, Value>,
 ) -> impl Iterator<Item = (&'a str, String, String)> {
     let fields: BTreeSet<&String> = one.keys().chain(other.keys()).collect();
-    let text = |identity: &BTreeMap<String, Value>, field: &String| {
-        let value = identity.get(field);
-        value.map_or("unset".to_owned(), ToString::to_string)
-    };
     fields.into_iter().filter_map(move |field| {
-        let (first, second) = (text(one, field), text(other, field));
+        let [first, second] = [one, other].map(|identity| {
+            identity
+                .get(field)
+                .map_or("unset".to_owned(), ToString::to_string)
+        });
         (first != second).then_some((field.as_str(), first, second))
     })
 }
 
-/// The column of what decides the marks of each judge of open answers.
+/// The column with the settings of each judge of open answers.
 pub const JUDGES: &str = "judge";
 
-/// The flag of a judge for a setting that models have, too: `--judge-temperature` for `--temperature`.
+/// The judge's form of a model flag: `--judge-temperature` for `--temperature`.
 pub fn judge_flag(flag: &str) -> String {
     flag.replacen("--", "--judge-", 1)
 }
@@ -105,8 +105,8 @@ pub struct ColumnDifference<'a> {
 }
 
 impl RunManifest {
-    /// Sets the counts and the status: the run is complete if all trials have a reply.
-    pub fn count(&mut self, counts: Counts) {
+    /// Sets the counts, and the status that follows from them: complete if all trials have a reply.
+    pub fn set_counts(&mut self, counts: Counts) {
         self.counts = counts;
         self.status = if counts.answered == counts.trials {
             Status::Complete
@@ -115,7 +115,7 @@ impl RunManifest {
         };
     }
 
-    /// Whether a model is one of this program's own, which is asked at no endpoint.
+    /// True if a model is built into this program and not asked through an endpoint.
     #[must_use]
     pub fn is_built_in(&self, model: &str) -> bool {
         let content = self
@@ -165,31 +165,31 @@ fn fields(object: &Value) -> BTreeMap<String, Value> {
         .collect()
 }
 
-/// The place of a part's sources (frames or walks) among all of its run, in the order of their first questions.
+/// The range of a shard's sources (frames or walks) among all sources of the run, in the order of their first questions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PartPlace {
-    /// Place of the first source, from 0.
+    /// Index of the first source, from 0.
     pub first: usize,
-    /// Number of sources of the part.
+    /// Number of sources of the shard.
     pub count: usize,
     /// Number of sources of the whole run.
     pub of: usize,
 }
 
-/// Task of one part of a run.
+/// The trials of one shard of a run.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RunPart {
-    /// The place of its sources.
+    /// The range of the shard's sources.
     #[serde(flatten)]
     pub place: PartPlace,
     /// Number of trials about each source.
     pub trials: Vec<usize>,
 }
 
-/// The version of the lenient parsing in runs whose manifest names none.
+/// The version of the lenient parsing in runs whose manifest does not state one.
 pub const FIRST_REPLY_READING: &str = "lenient/1";
 
-/// The settings that all trials of a run share and no column tells apart, by flag.
+/// The settings that all trials of a run share and that are not a column of its tables, by flag.
 pub type Identity = BTreeMap<String, Value>;
 
 /// The definition of each value in a column of the tables, by column and value.
@@ -210,13 +210,13 @@ pub struct RunManifest {
     pub updated: String,
     /// The platform, and the versions of the libraries that process pixels.
     pub platform: BTreeMap<String, String>,
-    /// The settings that all trials share and no column shows, by flag. A run can only be resumed with the same identity.
+    /// The settings that all trials share and that are not a column, by flag. A run can only be resumed with the same identity.
     pub identity: Identity,
     /// The meaning of each value in a column of the tables, by column and value: models, enhancers, noise profiles. A run may
     /// get further values; the meaning of an existing value never changes.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub columns: Columns,
-    /// The models of the file of models, in its order; empty without a file.
+    /// The models in the order of the models file; empty without a file.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub models: Vec<ListedModel>,
     /// How each enhancer was used, by its name; empty in runs of earlier versions.
@@ -225,19 +225,19 @@ pub struct RunManifest {
     /// Changes made to the images when their files were read; `None` if there were none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub inputs: Option<InputSummary>,
-    /// The part of an evaluation, as `2/4`; `None` for the whole evaluation.
+    /// The shard of an evaluation, as `2/4`; `None` for the whole evaluation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shard: Option<String>,
-    /// Task of the part; `None` for the whole evaluation.
+    /// The trials of the shard; `None` for the whole evaluation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub part: Option<RunPart>,
-    /// The settings that change no reply: concurrency, timeouts.
+    /// The settings without an effect on replies: concurrency, timeouts.
     pub settings: BTreeMap<String, Value>,
     /// The flags that decide the images, as the user wrote them; empty in runs of earlier versions.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub images: BTreeMap<String, Value>,
-    /// The version of the rules by which the lenient parsing in the records was made, as `lenient/4`; `None` in runs of open questions,
-    /// and in runs of earlier versions, which read by `lenient/1`.
+    /// The version of the lenient parsing in the records, as `lenient/4`; `None` in runs of open questions, and in runs of earlier versions
+    /// of this program, which used [`FIRST_REPLY_READING`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reply_reading: Option<String>,
     /// The number of trials, answered and failed.

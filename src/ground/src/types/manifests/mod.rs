@@ -5,9 +5,9 @@ mod flaw;
 mod input_note;
 mod manifest;
 mod model_listing;
-mod model_views;
 mod recorded_names;
 mod size_log;
+mod stored_views;
 
 pub use enhancer_note::{
     ConventionLine, ELSEWHERE, EnhancerNote, FlawedImage, JudgedImages, ProbeNote, ProbeOutcome,
@@ -20,6 +20,6 @@ pub use manifest::{
     RunManifest, RunPart, Status, differences, judge_flag,
 };
 pub use model_listing::{ListedModel, ModelColumn, ModelListing};
-pub use model_views::{Fit, StoredViews, Views};
 pub use recorded_names::RecordedNames;
 pub use size_log::{SeamCounts, SizeLog};
+pub use stored_views::{Fit, StoredViews, Views};

@@ -1,21 +1,21 @@
-//! The models of a report as tables list them ([`ModelListing`]): their order, groups, marks and further columns.
+//! Order, groups, marks and extra columns of the models in a report's tables: [`ModelListing`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 
-/// A model of a file of models, as tables show it.
+/// A model from the models file, as tables show it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ListedModel {
     /// The name in tables.
     pub name: String,
-    /// The heading under which tables show it; `None` for none.
+    /// The heading under which tables show the model; `None` without a heading.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub group: Option<String>,
 }
 
-/// The models of a report, in order: first those without a group, then group by group, each as listed. Unlisted models follow those without
-/// a group, by name. Without a list the order is by name.
+/// The models of a report. Their order in tables is: listed models without a group, unlisted models by name, then each group; listed models
+/// keep the order of the list. Without a list the order is by name.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct ModelListing {
     listed: Vec<ListedModel>,
@@ -23,9 +23,9 @@ pub struct ModelListing {
     groups: Vec<String>,
     /// Changes to the requests that a server's refusals made necessary, by model.
     adapted: BTreeMap<String, Vec<String>>,
-    /// Facts about each model, for the further columns.
-    facts: BTreeMap<(ModelColumn, String), String>,
-    /// The further columns of tables.
+    /// Cells of the extra columns, by column and model.
+    cells: BTreeMap<(ModelColumn, String), String>,
+    /// The extra columns of tables.
     columns: Vec<ModelColumn>,
     /// The names under which people answered.
     people: BTreeSet<String>,
@@ -33,7 +33,7 @@ pub struct ModelListing {
     training: BTreeMap<String, String>,
 }
 
-/// A further column of tables, about the model of a row.
+/// An extra column of tables, about the model of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 #[cfg_attr(feature = "program", derive(clap::ValueEnum))]
 pub enum ModelColumn {
@@ -69,11 +69,11 @@ impl ModelColumn {
 /// The mark of a model whose requests were changed.
 const MARK: char = '†';
 
-/// The place of a model among others: of its group, and of the model within all that are listed.
+/// Sort key of a model: the place of its group, then its own place among all listed models.
 pub(super) type ModelPlace = (usize, usize);
 
 impl ModelListing {
-    /// The order of these models; of several of one name the first counts.
+    /// A listing of these models; of several models with the same name the first counts.
     #[must_use]
     pub fn new(models: impl IntoIterator<Item = ListedModel>) -> Self {
         let mut order = Self::default();
@@ -91,13 +91,15 @@ impl ModelListing {
         order
     }
 
-    /// The place of a model. A name with a run or a time behind it, as `gpt-4o (one)`, stands where the name alone does.
+    /// The sort key of a model. A name followed by a run or a time in brackets, as `gpt-4o (one)`, has the place of the bare name.
     pub fn place(&self, model: &str) -> ModelPlace {
         let Some(place) = self.index(model) else {
             return (0, self.listed.len());
         };
-        let group = self.listed[place].group.as_ref();
-        let group = group.and_then(|group| self.groups.iter().position(|known| known == group));
+        let group = self.listed[place]
+            .group
+            .as_ref()
+            .and_then(|group| self.groups.iter().position(|known| known == group));
         (group.map_or(0, |group| group + 1), place)
     }
 
@@ -113,8 +115,8 @@ impl ModelListing {
         !self.groups.is_empty()
     }
 
-    /// Notes that the requests to a model were changed in these ways.
-    pub fn adapted(&mut self, model: &str, changes: impl IntoIterator<Item = String>) {
+    /// Records changes to the requests of a model.
+    pub fn add_changes(&mut self, model: &str, changes: impl IntoIterator<Item = String>) {
         let known = self.adapted.entry(model.to_owned()).or_default();
         for change in changes {
             if !known.contains(&change) {
@@ -123,12 +125,12 @@ impl ModelListing {
         }
     }
 
-    /// Notes that people answered under this name.
+    /// Records a name under which people answered.
     pub fn add_people(&mut self, name: String) {
         self.people.insert(name);
     }
 
-    /// Notes the data that an enhancer was trained on.
+    /// Records the data that an enhancer was trained on.
     pub fn add_training(&mut self, enhancer: &str, data: String) {
         self.training.insert(enhancer.to_owned(), data);
     }
@@ -155,20 +157,20 @@ impl ModelListing {
         })
     }
 
-    /// These models without people; the people if there are no others.
+    /// Removes people from these models; if all of them are people, returns them all.
     pub fn without_people<'m>(&self, models: impl IntoIterator<Item = &'m str>) -> Vec<&'m str> {
         let (people, models): (Vec<&str>, Vec<&str>) =
             models.into_iter().partition(|model| self.is_people(model));
         if models.is_empty() { people } else { models }
     }
 
-    /// Notes what stands in a column about a model.
-    pub fn note(&mut self, column: ModelColumn, model: String, value: String) {
-        self.facts.insert((column, model), value);
+    /// Sets the cell of an extra column for a model.
+    pub fn set_cell(&mut self, column: ModelColumn, model: String, value: String) {
+        self.cells.insert((column, model), value);
     }
 
-    /// The listing with further columns in tables, each once.
-    pub fn show(&mut self, columns: &[ModelColumn]) {
+    /// Adds extra columns to the tables, each once.
+    pub fn add_columns(&mut self, columns: &[ModelColumn]) {
         for column in columns {
             if !self.columns.contains(column) {
                 self.columns.push(*column);
@@ -176,15 +178,16 @@ impl ModelListing {
         }
     }
 
-    /// The further columns.
+    /// The extra columns.
     pub fn columns(&self) -> &[ModelColumn] {
         &self.columns
     }
 
-    /// Content of a further column for a model; empty if unknown.
-    pub fn fact(&self, column: ModelColumn, model: &str) -> &str {
-        let fact = self.facts.get(&(column, model.to_owned()));
-        fact.map_or("", String::as_str)
+    /// The cell of an extra column for a model; empty if unknown.
+    pub fn cell(&self, column: ModelColumn, model: &str) -> &str {
+        self.cells
+            .get(&(column, model.to_owned()))
+            .map_or("", String::as_str)
     }
 
     /// The name of a model in tables, with a mark if its requests were changed.
@@ -197,7 +200,7 @@ impl ModelListing {
     }
 
     /// Footnote that explains the mark, if one of these models has it.
-    pub fn foot<'m>(&self, models: impl IntoIterator<Item = &'m str>) -> Option<String> {
+    pub fn footnote<'m>(&self, models: impl IntoIterator<Item = &'m str>) -> Option<String> {
         let mut seen: Vec<&str> = Vec::new();
         let mut notes: Vec<String> = Vec::new();
         for model in models {
@@ -216,17 +219,20 @@ impl ModelListing {
         })
     }
 
+    /// The index of a model in the list. Without the name itself, the longest name that it begins with before ` (` counts.
     fn index(&self, model: &str) -> Option<usize> {
         let exact = self.listed.iter().position(|known| known.name == model);
         exact.or_else(|| {
-            let begins = |known: &ListedModel| {
-                let rest = model.strip_prefix(&*known.name);
-                rest.is_some_and(|rest| rest.starts_with(" ("))
-            };
-            let known = self.listed.iter().enumerate();
-            let known = known.filter(|(_, known)| begins(known));
-            let longest = known.max_by_key(|(_, known)| known.name.len());
-            longest.map(|(index, _)| index)
+            self.listed
+                .iter()
+                .enumerate()
+                .filter(|(_, known)| {
+                    model
+                        .strip_prefix(&*known.name)
+                        .is_some_and(|rest| rest.starts_with(" ("))
+                })
+                .max_by_key(|(_, known)| known.name.len())
+                .map(|(index, _)| index)
         })
     }
 }
@@ -252,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn models_stand_as_listed_and_groups_together() {
+    fn models_keep_the_listed_order_within_groups() {
         let listing = ModelListing::new([
             listed("z", Some("large")),
             listed("m", None),
@@ -270,19 +276,19 @@ mod tests {
     }
 
     #[test]
-    fn changed_models_are_marked_and_the_mark_is_explained() {
+    fn changed_models_have_a_mark_and_footnote() {
         let mut listing = ModelListing::default();
-        listing.adapted("a", ["no x is sent".to_owned(), "no y is sent".to_owned()]);
-        listing.adapted("a", ["no x is sent".to_owned()]);
+        listing.add_changes("a", ["no x is sent".to_owned(), "no y is sent".to_owned()]);
+        listing.add_changes("a", ["no x is sent".to_owned()]);
         assert_eq!(listing.label("a"), "a †");
         assert_eq!(listing.label("b"), "b");
-        let foot = listing.foot(["b", "a", "a"]).unwrap();
-        assert!(foot.ends_with("(a: no x is sent, no y is sent)"), "{foot}");
-        assert_eq!(listing.foot(["b"]), None);
+        let note = listing.footnote(["b", "a", "a"]).unwrap();
+        assert!(note.ends_with("(a: no x is sent, no y is sent)"), "{note}");
+        assert_eq!(listing.footnote(["b"]), None);
     }
 
     #[test]
-    fn people_are_apart_unless_they_are_alone() {
+    fn people_are_removed_unless_alone() {
         let mut listing = ModelListing::default();
         listing.add_people("human".to_owned());
         assert!(listing.is_people("human (one)") && !listing.is_people("humane"));
@@ -291,14 +297,14 @@ mod tests {
     }
 
     #[test]
-    fn without_a_list_names_decide() {
+    fn unlisted_models_are_sorted_by_name() {
         let listing = ModelListing::default();
         assert_eq!(sorted(&listing, vec!["b", "c", "a"]), ["a", "b", "c"]);
         assert!(!listing.has_groups());
     }
 
     #[test]
-    fn a_name_with_a_run_stands_where_the_name_does() {
+    fn names_with_a_run_have_the_place_of_the_model() {
         let listing = ModelListing::new([
             listed("b", None),
             listed("a (fp8)", None),

@@ -6,29 +6,28 @@ use serde_json::json;
 
 use super::manifest::RunManifest;
 
-/// The entry of a manifest's settings that holds the names.
+/// The key of the names in a manifest's settings.
 const RENAMED: &str = "renamed models";
 
-/// The name in tables of each name in records. A name that is not among them is the same in both.
+/// A map from model names in records to names in tables, for the names that differ.
 ///
-/// Records are never changed. A name in records always stands for one model with one set of settings that decide its replies; a
-/// model that gets another name, or whose name another one gets, keeps its records.
+/// Records are never changed. A name in records always refers to one model with one set of settings that decide its replies. If a model is
+/// renamed, or another model takes its name, it keeps its records.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct RecordedNames(BTreeMap<String, String>);
 
 impl RecordedNames {
-    /// The names that a manifest holds.
+    /// Reads the names from a manifest.
     pub fn from_manifest(manifest: &RunManifest) -> Self {
-        let names = manifest.settings.get(RENAMED).cloned();
-        Self(
-            names
-                .and_then(|names| serde_json::from_value(names).ok())
-                .unwrap_or_default(),
-        )
+        let names = manifest
+            .settings
+            .get(RENAMED)
+            .and_then(|names| serde_json::from_value(names.clone()).ok());
+        Self(names.unwrap_or_default())
     }
 
-    /// Puts the names into a manifest.
-    pub fn note(&self, manifest: &mut RunManifest) {
+    /// Writes the names to a manifest.
+    pub fn write_to(&self, manifest: &mut RunManifest) {
         if self.0.is_empty() {
             manifest.settings.remove(RENAMED);
         } else {
@@ -37,49 +36,44 @@ impl RecordedNames {
     }
 
     /// The name in tables of a name in records.
-    pub fn shown<'n>(&'n self, recorded: &'n str) -> &'n str {
+    pub fn table_name<'n>(&'n self, recorded: &'n str) -> &'n str {
         self.0.get(recorded).map_or(recorded, String::as_str)
     }
 
-    /// The name in records of a name in tables: the same, unless it stands for another model there.
-    pub fn recorded<'n>(&'n self, shown: &'n str) -> &'n str {
-        if self.shown(shown) == shown {
-            return shown;
+    /// The name in records of a name in tables: the same, unless records use it for another model.
+    pub fn record_name<'n>(&'n self, name: &'n str) -> &'n str {
+        if self.table_name(name) == name {
+            return name;
         }
-        self.other(shown).unwrap_or(shown)
+        self.other_record_name(name).unwrap_or(name)
     }
 
-    /// Gives models other names in tables, all at once.
+    /// Renames models in tables, from old name to new name, all at once.
     pub fn rename(&mut self, moves: &BTreeMap<String, String>) {
-        let same: Vec<&String> = moves
-            .keys()
-            .filter(|name| !self.0.contains_key(*name))
-            .collect();
-        let same: Vec<(String, String)> = same
-            .into_iter()
-            .map(|name| (name.clone(), name.clone()))
-            .collect();
-        self.0.extend(same);
-        for shown in self.0.values_mut() {
-            if let Some(new) = moves.get(shown) {
-                shown.clone_from(new);
+        for name in moves.keys() {
+            self.0.entry(name.clone()).or_insert_with(|| name.clone());
+        }
+        for name in self.0.values_mut() {
+            if let Some(new) = moves.get(name) {
+                name.clone_from(new);
             }
         }
-        self.0.retain(|recorded, shown| recorded != shown);
+        self.0.retain(|recorded, name| recorded != name);
     }
 
-    /// Makes sure that a name in tables has one in records: `spare` if its own stands for another model.
-    pub fn ensure(&mut self, shown: &str, spare: impl FnOnce() -> String) {
-        if self.shown(shown) != shown && self.other(shown).is_none() {
-            self.0.insert(spare(), shown.to_owned());
+    /// Makes sure that a name in tables has a name in records: `spare` if records use the same name for another model.
+    pub fn ensure(&mut self, name: &str, spare: impl FnOnce() -> String) {
+        if self.table_name(name) != name && self.other_record_name(name).is_none() {
+            self.0.insert(spare(), name.to_owned());
         }
     }
 
-    fn other(&self, shown: &str) -> Option<&str> {
+    /// A different name in records that is shown under this name in tables.
+    fn other_record_name(&self, name: &str) -> Option<&str> {
         self.0
             .iter()
-            .find(|(_, name)| *name == shown)
-            .map(|(name, _)| name.as_str())
+            .find(|(_, shown)| *shown == name)
+            .map(|(recorded, _)| recorded.as_str())
     }
 }
 
@@ -95,39 +89,43 @@ mod tests {
     }
 
     #[test]
-    fn a_name_in_records_stands_for_one_model_whatever_it_is_called() {
+    fn record_names_keep_their_model_after_renaming() {
         let mut names = RecordedNames::default();
         moved(&mut names, &[("m", "m (before)")]);
         names.ensure("m", || "m [1]".to_owned());
         assert_eq!(
-            (names.shown("m"), names.recorded("m")),
+            (names.table_name("m"), names.record_name("m")),
             ("m (before)", "m [1]")
         );
-        assert_eq!(names.shown("m [1]"), "m");
+        assert_eq!(names.table_name("m [1]"), "m");
         // Rename back and forth again.
         moved(&mut names, &[("m (before)", "m"), ("m", "m (before)")]);
-        assert_eq!((names.shown("m"), names.recorded("m")), ("m", "m"));
-        assert_eq!(names.shown("m [1]"), "m (before)");
-        assert_eq!(names.recorded("m (before)"), "m [1]");
+        assert_eq!((names.table_name("m"), names.record_name("m")), ("m", "m"));
+        assert_eq!(names.table_name("m [1]"), "m (before)");
+        assert_eq!(names.record_name("m (before)"), "m [1]");
         moved(&mut names, &[("m (before)", "m"), ("m", "m (before)")]);
         names.ensure("m", || unreachable!());
         assert_eq!(
-            (names.shown("m"), names.recorded("m")),
+            (names.table_name("m"), names.record_name("m")),
             ("m (before)", "m [1]")
         );
     }
 
     #[test]
-    fn a_new_name_is_that_of_old_records_too() {
+    fn renaming_applies_to_earlier_records() {
         let mut names = RecordedNames::default();
         moved(&mut names, &[("a", "b")]);
         moved(&mut names, &[("b", "c")]);
         assert_eq!(
-            (names.shown("a"), names.shown("b"), names.shown("c")),
+            (
+                names.table_name("a"),
+                names.table_name("b"),
+                names.table_name("c")
+            ),
             ("c", "c", "c")
         );
-        assert_eq!(names.recorded("c"), "c");
+        assert_eq!(names.record_name("c"), "c");
         moved(&mut names, &[("c", "a")]);
-        assert_eq!((names.shown("a"), names.shown("b")), ("a", "a"));
+        assert_eq!((names.table_name("a"), names.table_name("b")), ("a", "a"));
     }
 }

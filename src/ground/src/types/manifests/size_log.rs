@@ -1,17 +1,17 @@
-//! In which sizes a run's images were enhanced: [`SizeLog`].
+//! Counts of the image sizes in which an enhancer ran: [`SizeLog`].
 
 use std::fmt::Write as _;
 
 use serde::{Deserialize, Serialize};
 
-/// Counts of the size adaptations of an enhancer's images, and the figures that decided them. An image can count as both padded and tiled.
+/// Counts of the ways in which image sizes were adapted to an enhancer, with their parameters. An image can be both padded and tiled.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SizeLog {
     /// Images that were enhanced.
     pub images: usize,
-    /// Images that went through as they are.
+    /// Images that were enhanced at their own size.
     pub whole: usize,
-    /// Images that were filled to the right and below, and cropped afterwards.
+    /// Images that were padded on the right and at the bottom, and cropped afterwards.
     pub padded: usize,
     /// Images that were cut into tiles.
     pub tiled: usize,
@@ -19,25 +19,25 @@ pub struct SizeLog {
     pub resized: usize,
     /// Images that were reduced by `--llie-options max-side` and enlarged again.
     pub reduced: usize,
-    /// Width and height that a side of every run has; `None` for any.
+    /// Fixed width and height of the model's input; `None` for a side of any length.
     pub fixed: Option<[Option<usize>; 2]>,
     /// Sides must be multiples of this many pixels; `None` if any size will do.
     pub multiple: Option<usize>,
-    /// Pixels that filled images, as `reflect`; `None` if none was filled.
+    /// Padding mode, as `reflect`; `None` if no image was padded.
     pub pad: Option<String>,
     /// Width and height of the largest tiles; `None` if no image was cut.
     pub tile: Option<[usize; 2]>,
     /// Largest context of tiles in pixels; `None` if no image was cut.
     pub context: Option<usize>,
-    /// Farthest pixels on which a pixel of the result was seen to depend; `None` if it was not measured.
+    /// Measured radius of the receptive field, in pixels; `None` if it was not measured.
     pub reach: Option<usize>,
-    /// Comparison of all pixels that two tiles gave.
+    /// Comparison of the pixels in the overlap of two tiles.
     pub seam: SeamCounts,
-    /// Images that took too long, and were not enhanced.
+    /// Images that were not enhanced because of the time limit.
     pub too_long: usize,
 }
 
-/// Comparison of the samples that two tiles gave, over all images.
+/// Comparison of the samples in the overlap of two tiles, over all images.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SeamCounts {
     /// Samples that were compared.
@@ -47,7 +47,7 @@ pub struct SeamCounts {
     pub black: usize,
     /// Samples that differed.
     pub differing: usize,
-    /// Largest difference in codes of 255.
+    /// Largest difference in 8-bit codes.
     pub most: u8,
 }
 
@@ -61,7 +61,7 @@ fn is_zero(count: &usize) -> bool {
 }
 
 impl SizeLog {
-    /// Adds what another enhancer of the same model did.
+    /// Adds the counts of another session of the same model.
     pub fn add(&mut self, other: &Self) {
         let Self {
             images,
@@ -89,7 +89,7 @@ impl SizeLog {
         self.fixed = fixed.or(self.fixed);
         self.multiple = multiple.or(self.multiple);
         self.pad = pad.clone().or(self.pad.take());
-        // The same whatever the order of the images.
+        // Maxima do not depend on the order of the images.
         self.tile = self.tile.max(*tile);
         self.context = self.context.max(*context);
         self.reach = self.reach.max(*reach);
@@ -114,7 +114,7 @@ impl SizeLog {
                 compared: self.seam.compared - earlier.seam.compared,
                 black: self.seam.black - earlier.seam.black,
                 differing: self.seam.differing - earlier.seam.differing,
-                // The largest of all images so far; sums of parts have the same largest.
+                // A maximum cannot be subtracted; adding the difference to `earlier` gives the same maximum.
                 most: self.seam.most,
             },
             ..self.clone()
@@ -124,26 +124,30 @@ impl SizeLog {
     /// Summary in words, as `12 images: 8 as they are, 4 in tiles of 512 × 512 with 8 px context`.
     #[must_use]
     pub fn summary(&self) -> String {
-        let mut parts = Vec::new();
-        let mut part = |count: usize, words: String| {
-            if count == self.images && count > 0 {
-                parts.push(words);
-            } else if count > 0 {
-                parts.push(format!("{count} {words}"));
-            }
-        };
-        part(self.whole, "as they are".to_owned());
         let pad = self.pad.as_deref().unwrap_or_default();
-        part(self.padded, format!("filled ({pad}) and cropped"));
-        part(self.tiled, self.tiles());
-        part(
-            self.resized,
-            format!("resized to {} and back", self.fixed()),
-        );
-        part(
-            self.reduced,
-            "reduced by --llie-options max-side and enlarged".to_owned(),
-        );
+        let parts: Vec<String> = [
+            (self.whole, "as they are".to_owned()),
+            (self.padded, format!("filled ({pad}) and cropped")),
+            (self.tiled, self.tiles()),
+            (
+                self.resized,
+                format!("resized to {} and back", self.fixed()),
+            ),
+            (
+                self.reduced,
+                "reduced by --llie-options max-side and enlarged".to_owned(),
+            ),
+        ]
+        .into_iter()
+        .filter(|(count, _)| *count > 0)
+        .map(|(count, words)| {
+            if count == self.images {
+                words
+            } else {
+                format!("{count} {words}")
+            }
+        })
+        .collect();
         let images = if self.images == 1 { "image" } else { "images" };
         let mut text = format!("{} {images}", self.images);
         if !parts.is_empty() {
@@ -181,6 +185,7 @@ impl SizeLog {
         )
     }
 
+    /// The fixed input size of the model, as `96 × any`.
     fn fixed(&self) -> String {
         let [width, height] = self
             .fixed
@@ -195,7 +200,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_summary_names_what_was_done() {
+    fn summary_lists_size_adaptations() {
         let log = SizeLog {
             images: 12,
             whole: 8,

@@ -1,4 +1,4 @@
-//! Questions, their families and the parts of images that they are about.
+//! Questions, their families and the bounding boxes of the objects that they are about.
 
 mod outlines;
 mod question;

@@ -1,20 +1,23 @@
-//! The boxes of the things that a question is about: [`RunQuestion::outlines`], [`RunQuestion::object`].
+//! Bounding boxes of the objects that a question is about: [`RunQuestion::outlines`], [`RunQuestion::object`].
 
 use serde_json::Value;
 
 use super::question::Family;
 use super::run_question::RunQuestion;
 
-/// A box in pixels of a frame: left, top, right, bottom.
+/// A bounding box in pixels of a frame: left, top, right, bottom.
 pub type PixelBox = [u32; 4];
 
 impl RunQuestion {
-    /// Boxes of the objects in the question's evidence: all segments with the word asked about, or all candidates for the closest object.
-    /// Empty for questions about the whole room and for those without evidence.
+    /// Bounding boxes of the objects in the question's evidence: all segments with the word asked about, or all candidates for the closest
+    /// object. Empty for questions about the whole room or without evidence.
     #[must_use]
     pub fn outlines(&self) -> Vec<PixelBox> {
-        let about = self.evidence.get("about").and_then(Value::as_str);
-        let about = about.filter(|about| !about.is_empty());
+        let about = self
+            .evidence
+            .get("about")
+            .and_then(Value::as_str)
+            .filter(|about| !about.is_empty());
         self.evidence
             .get("segments")
             .and_then(Value::as_array)
@@ -30,7 +33,7 @@ impl RunQuestion {
             .collect()
     }
 
-    /// The smallest box that holds all of [`Self::outlines`].
+    /// The smallest box around all of [`Self::outlines`]; `None` if there are none.
     #[must_use]
     pub fn object(&self) -> Option<PixelBox> {
         self.outlines().into_iter().reduce(|one, other| {

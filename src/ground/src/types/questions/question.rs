@@ -90,7 +90,7 @@ impl<'de> Deserialize<'de> for Family {
     }
 }
 
-/// The answers that a question offers, in the order shown, and the index of the true one, if anybody knows it.
+/// The answers that a question offers, in the order shown, and the index of the true one if it is known.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Choices {
     texts: Arc<[String]>,
@@ -107,7 +107,7 @@ impl Choices {
     /// # Errors
     /// [`Error::Data`] at the place `choices`.
     pub fn new(texts: Vec<String>, truth: usize) -> Result<Self, Error> {
-        Self::known_by(texts.into(), Some(truth))
+        Self::with_truth(texts.into(), Some(truth))
     }
 
     /// Checks a list of choices without a known true one, as [`new`](Self::new) does.
@@ -115,24 +115,23 @@ impl Choices {
     /// # Errors
     /// [`Error::Data`] at the place `choices`.
     pub fn without_truth(texts: Vec<String>) -> Result<Self, Error> {
-        Self::known_by(texts.into(), None)
+        Self::with_truth(texts.into(), None)
     }
 
     /// Checks a list of choices with the index of the true one, or `None` if nobody knows it.
     ///
     /// # Errors
     /// [`Error::Data`] at the place `choices`.
-    pub fn known_by(texts: Arc<[String]>, truth: Option<usize>) -> Result<Self, Error> {
-        let wrong = |problem: String| Err(Error::data("choices", problem));
+    pub fn with_truth(texts: Arc<[String]>, truth: Option<usize>) -> Result<Self, Error> {
         if !(2..=Self::MOST).contains(&texts.len()) {
-            return wrong(format!(
+            return choices_error(format!(
                 "{} choices: a question needs 2 to {}",
                 texts.len(),
                 Self::MOST
             ));
         }
         if let Some(truth) = truth.filter(|truth| *truth >= texts.len()) {
-            return wrong(format!(
+            return choices_error(format!(
                 "the answer is choice {} of {}",
                 truth + 1,
                 texts.len()
@@ -144,10 +143,10 @@ impl Choices {
             .collect();
         for (i, text) in folded.iter().enumerate() {
             if text.is_empty() {
-                return wrong(format!("choice {} is empty", letter(i)));
+                return choices_error(format!("choice {} is empty", letter(i)));
             }
             if let Some(j) = folded[..i].iter().position(|earlier| earlier == text) {
-                return wrong(format!(
+                return choices_error(format!(
                     "choices {} and {} are both {:?}",
                     letter(j),
                     letter(i),
@@ -178,16 +177,20 @@ impl Choices {
     }
 }
 
-/// The choice of a model that does not see enough. A choice with these words, in any letter case, is the way out of its question.
+/// The text of the choice "not enough is visible". A choice with these words, in any letter case, is not a wrong answer but an abstention.
 pub const CANNOT_TELL: &str = "cannot tell";
 
-/// Whether the true answers to the questions of a run are known. A run has questions of one kind alone.
+/// Whether the true answers to the questions of a run are known: of all of its questions, or of none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Truths {
     /// Every question has a true answer: replies are right or wrong.
     Known,
-    /// No question has one: a model is held against its own answers.
+    /// No true answer is known: a model is compared with its own answers at L0.
     Unknown,
+}
+
+fn choices_error(problem: String) -> Result<Choices, Error> {
+    Err(Error::data("choices", problem))
 }
 
 /// The letter of the choice at an index: 0 is `A`.
@@ -209,7 +212,7 @@ pub struct Question {
     pub text: String,
     /// The answers that the model may choose from.
     pub choices: Choices,
-    /// The questions that this one is scored with; `None` if the data set has no groups.
+    /// The group of questions that are scored together; `None` if the data set has no groups.
     pub group: Option<StrictGroup>,
     /// The facts from which the generator derived the answer; `Null` if the data set states none.
     pub evidence: serde_json::Value,
@@ -224,7 +227,7 @@ pub enum Answer {
     Unparsed(UnreadReason),
 }
 
-/// Why no choice could be read from a reply.
+/// The reason why no choice could be read from a reply.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum UnreadReason {
@@ -244,7 +247,7 @@ pub enum UnreadReason {
     Contradiction,
     /// The reply named one choice only to deny it.
     Negated,
-    /// No choice was named in the form that this reading accepts.
+    /// No choice was named in a form that the parsing accepts.
     NoChoice,
     /// A person said that they cannot tell.
     CannotTell,

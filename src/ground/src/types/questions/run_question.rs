@@ -9,7 +9,7 @@ use crate::error::Error;
 use crate::types::images::FrameId;
 use crate::types::values::Digest;
 
-/// The key in [`RunQuestion::evidence`] under which a question that is asked about every image has its name among such questions.
+/// The key in [`RunQuestion::evidence`] with the name of a question that is asked about every image ([`RunQuestion::bank_id`]).
 pub const BANK_ID: &str = "bank_id";
 
 /// One line of a run's `questions.jsonl`: a question with the scene of its frame. The file can also be used as `--questions`.
@@ -46,12 +46,12 @@ pub struct RunQuestion {
     /// The frames of a question that shows several, in order; not in the file otherwise.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub images: Vec<FrameId>,
-    /// The questions that this one is scored with, as `group` and `group_size`; not in the file if the data set has no groups.
+    /// The group of questions that are scored together, written as `group` and `group_size`; not in the file if the data set has no groups.
     #[serde(default, flatten, skip_serializing_if = "Option::is_none")]
     pub group: Option<StrictGroup>,
 }
 
-/// A part of a question.
+/// A part of a question in which two versions of it can differ.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum QuestionPart {
     /// The words of the question.
@@ -60,15 +60,15 @@ pub enum QuestionPart {
     Choices,
     /// The right answers.
     Answer,
-    /// The name of the image, or of the several that it shows.
+    /// The name of the image, or the names of several.
     Frame,
-    /// The content of the image, or how it is read.
+    /// The content of the image, or the way in which its file is decoded.
     Image,
-    /// The family.
+    /// The family of the question.
     Family,
-    /// The scene of its frame.
+    /// The scene of the frame.
     Scene,
-    /// The questions that it is scored with.
+    /// The group of questions that are scored together.
     Group,
 }
 
@@ -90,22 +90,24 @@ impl QuestionPart {
 }
 
 impl RunQuestion {
-    /// Whether two questions are the same, evidence and place aside; images and groups are compared if both are known.
+    /// True if two questions are equal, ignoring evidence and place. Images and groups are compared only if both are known.
     #[must_use]
     pub fn is_same(&self, other: &Self) -> bool {
         self.id == other.id && self.difference(other).is_none()
     }
 
-    /// The first part in which two questions of one name differ; `None` if they are the same ([`Self::is_same`]).
+    /// The first part in which two questions with the same name differ; `None` if [`Self::is_same`] is true.
     #[must_use]
     pub fn difference(&self, other: &Self) -> Option<QuestionPart> {
         let images = self.image.zip(other.image);
         let groups = self.group.as_ref().zip(other.group.as_ref());
-        let answers = |question: &Self| (question.answer.clone(), question.extra_answers.clone());
         let parts = [
             (QuestionPart::Text, self.text != other.text),
             (QuestionPart::Choices, self.choices != other.choices),
-            (QuestionPart::Answer, answers(self) != answers(other)),
+            (
+                QuestionPart::Answer,
+                (&self.answer, &self.extra_answers) != (&other.answer, &other.extra_answers),
+            ),
             (
                 QuestionPart::Frame,
                 (&self.frame, &self.images) != (&other.frame, &other.images),
@@ -127,7 +129,7 @@ impl RunQuestion {
             .map(|(part, _)| part)
     }
 
-    /// The question without its evidence, which may be ten times as large as the rest; the name in [`bank_id`](Self::bank_id) stays.
+    /// Removes the evidence, which may be ten times as large as the rest, except the name in [`bank_id`](Self::bank_id).
     #[must_use]
     pub fn without_evidence(mut self) -> Self {
         let bank_id = self.evidence.get_mut(BANK_ID).map(Value::take);
@@ -135,10 +137,10 @@ impl RunQuestion {
         self
     }
 
-    /// Digest of the question as a judge sees it: its words and its right answers. The same answer to two questions with equal digests has
-    /// one mark.
+    /// Digest of the question as a judge sees it: its words and its right answers. If two questions have equal digests, the same answer to
+    /// both is marked once.
     #[must_use]
-    pub fn judged_words(&self) -> Digest {
+    pub fn judge_digest(&self) -> Digest {
         let answer = self.answer.as_deref().unwrap_or_default();
         let further = self.extra_answers.iter().flat_map(|answers| {
             let answers = answers.iter().map(String::as_bytes);
@@ -148,7 +150,7 @@ impl RunQuestion {
         Digest::from_parts(words.chain(further))
     }
 
-    /// The name of the question among those that are asked about every image; its own name if it is about one image alone.
+    /// The name of a question that is asked about every image, the same for all images; for other questions their own name.
     #[must_use]
     pub fn bank_id(&self) -> &str {
         self.evidence
@@ -157,7 +159,7 @@ impl RunQuestion {
             .unwrap_or(&self.id.0)
     }
 
-    /// The stored form of a question at an index, about a frame of this scene.
+    /// The stored form of a question; `place` is its index among all questions of the data, `scene` the scene of its frame.
     #[must_use]
     pub fn new(question: &Question, place: usize, scene: &str) -> Self {
         let choices = question.choices.texts();
@@ -177,32 +179,33 @@ impl RunQuestion {
             group: question.group.clone(),
         }
     }
-    /// The question with choices that is stored.
+
+    /// Converts the stored form into a question with choices.
     ///
     /// # Errors
-    /// If its answer is not among its choices, or these are not the choices of a question.
+    /// If the answer is not among the choices, or the choices are invalid ([`Choices::new`]).
     pub fn to_question(&self) -> Result<Question, Error> {
-        let wrong = |problem: &dyn std::fmt::Display| {
-            Error::data(format_args!("question {:?}", self.id.0), problem)
-        };
         let truth = match &self.answer {
             None => None,
             Some(answer) => {
                 let place = self.choices.iter().position(|choice| choice == answer);
-                let problem = "its answer is not among its choices";
-                Some(place.ok_or_else(|| wrong(&problem))?)
+                Some(place.ok_or_else(|| self.error("its answer is not among its choices"))?)
             }
         };
-        let choices = Choices::known_by(self.choices.as_slice().into(), truth);
+        let choices = Choices::with_truth(self.choices.as_slice().into(), truth);
         Ok(Question {
             id: self.id.clone(),
             frame: self.frame.clone(),
             family: self.family.clone(),
             text: self.text.clone(),
-            choices: choices.map_err(|e| wrong(&e))?,
+            choices: choices.map_err(|e| self.error(e))?,
             group: self.group.clone(),
             evidence: self.evidence.clone(),
         })
+    }
+
+    fn error(&self, problem: impl std::fmt::Display) -> Error {
+        Error::data(format_args!("question {:?}", self.id.0), problem)
     }
 }
 
@@ -236,7 +239,7 @@ mod tests {
         ] {
             assert_eq!(found, Some(part));
         }
-        // A run of blind models knows no image; where the question stands, and its evidence, do not matter.
+        // A run with only blind models stores no image digest; the place is not compared.
         assert_eq!(change(|q| q.image = None), None);
         assert_eq!(change(|q| q.place = 7), None);
     }

@@ -10,7 +10,7 @@ use crate::types::questions::{Answer, Family, QuestionId, UnreadReason};
 use crate::types::replies::{Finish, LostAttempts, Observed, OptionProbabilities, Usage};
 use crate::types::values::Digest;
 
-/// Declares a detail, and the line of a record with it. serde's `flatten` would take a quarter more time to read a line,
+/// Declares a detail, and the type of a record line that contains it. serde's `flatten` would take a quarter more time to read a line,
 /// because it buffers every field (best of seven times 200,000 lines: 4.1 µs a line instead of 3.2).
 macro_rules! details {
     ($(#[$about:meta])* $name:ident, $line:ident { $($(#[$meta:meta])* $field:ident: $type:ty,)+ }) => {
@@ -20,7 +20,7 @@ macro_rules! details {
             $($(#[$meta])* pub $field: $type,)+
         }
 
-        /// A line of records with such a detail.
+        /// One line of a record file: the fields of every trial and those of the detail.
         #[derive(Debug, Deserialize)]
         pub struct $line {
             key: TrialKey,
@@ -97,7 +97,7 @@ details! {
         lenient: Option<AnswerReading>,
         /// How the trial ended.
         outcome: TrialOutcome,
-        /// The image as it was sent; of several the first.
+        /// The image as it was sent, or the first of several.
         image: Option<ImageFacts>,
         /// The other images of a question that shows several, in order; not in the file otherwise.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -123,13 +123,13 @@ impl ChoiceDetail {
 
     /// The digest of the file that was sent, or of all files in order; `None` without an image.
     #[must_use]
-    pub fn sent(&self) -> Option<Digest> {
+    pub fn file_digest(&self) -> Option<Digest> {
         Digest::from_file_digests(self.images().map(|image| image.digest))
     }
 
     /// The frame whose image was shown.
     #[must_use]
-    pub fn shown(&self) -> &FrameId {
+    pub fn sent_frame(&self) -> &FrameId {
         self.shown_frame.as_ref().unwrap_or(&self.frame)
     }
 }
@@ -148,14 +148,14 @@ details! {
         episode: String,
         /// The category of the question.
         category: String,
-        /// The name of the person who answered, of several; not in the file if nobody is named.
+        /// The name of the person who answered; not in the file if nobody is named.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         person: Option<String>,
         /// The answer that the judge was shown; `None` in records of answers.
         judged: Option<String>,
-        /// The mark as upstream's program reads it; `None` in records of answers, and if it reads no mark.
+        /// The mark that the program of OpenEQA parses from the reply; `None` in records of answers, and if it finds no mark.
         upstream: Option<i64>,
-        /// The mark as the tolerant protocol reads it; `None` as for `upstream`.
+        /// The mark that the tolerant protocol parses from the reply; `None` as for `upstream`.
         tolerant: Option<i64>,
         /// The frames that were sent.
         images: Option<WalkFacts>,
@@ -200,7 +200,7 @@ pub enum TrialOutcome {
     Right,
     /// The model named a false choice.
     Wrong,
-    /// The model named a choice of a question whose true choice nobody knows: neither right nor wrong.
+    /// The model named a choice, but nobody knows the true one: neither right nor wrong.
     Answered,
     /// A reply without a readable choice: scored as wrong, counted separately.
     Unparsed,
@@ -211,9 +211,9 @@ pub enum TrialOutcome {
 /// The answer that the strict or the lenient parsing finds in a reply.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct AnswerReading {
-    /// The index of the choice; `None` if none was read.
+    /// The index of the choice; `None` if the parsing found none.
     pub chosen: Option<usize>,
-    /// The reason why no choice was read; `None` if one was.
+    /// The reason why the parsing found no choice; `None` if it found one.
     pub why: Option<UnreadReason>,
 }
 
@@ -245,13 +245,13 @@ pub struct ImageFacts {
     pub height: usize,
     /// The file format: `png` or `jpeg`.
     pub format: String,
-    /// The EXIF orientation by which the frame was turned when its file was read, 2 to 8; not in the file if it was not turned.
+    /// The EXIF orientation, 2 to 8, by which the frame was rotated or mirrored on loading; not in the file without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub orientation: Option<u8>,
     /// Camera settings for this image; absent in the file for kinds that do not state them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exposure: Option<ExposureFacts>,
-    /// How dark the photograph of the frame is, of images in its darkness; not in the file for others.
+    /// How dark the photograph of the frame is; in the file only for images of a pair, which are as dark as the photograph.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pair: Option<PairFacts>,
 }

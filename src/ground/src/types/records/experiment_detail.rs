@@ -1,10 +1,10 @@
-//! Details of the two experiments' records, as reports keep them.
+//! [`StoredDetail`] of the two experiments: questions with choices and open questions.
 
 use std::borrow::Cow;
 
 use super::detail::{ChoiceLine, OpenLine};
 use super::trials::{AskedParts, ChoiceFacts, ChoiceTables, SentImages};
-use crate::types::{ChoiceDetail, Digest, Family, FrameId, OpenDetail, Record, StoredDetail};
+use crate::types::{ChoiceDetail, Digest, Family, OpenDetail, Record, StoredDetail};
 
 impl StoredDetail for ChoiceDetail {
     type Line = ChoiceLine;
@@ -25,8 +25,8 @@ impl StoredDetail for ChoiceDetail {
         }
     }
 
-    fn keep(record: &Record, tables: &mut ChoiceTables) -> ChoiceFacts {
-        tables.keep(record)
+    fn extract_facts(record: &Record, tables: &mut ChoiceTables) -> ChoiceFacts {
+        tables.extract_facts(record)
     }
 
     fn move_facts(facts: &ChoiceFacts, from: &ChoiceTables, to: &mut ChoiceTables) -> ChoiceFacts {
@@ -37,7 +37,7 @@ impl StoredDetail for ChoiceDetail {
         tables.shown_frame(*facts).map(|frame| &*frame.0)
     }
 
-    fn sent_of(facts: &ChoiceFacts, tables: &ChoiceTables) -> Option<Digest> {
+    fn sent_digest_of(facts: &ChoiceFacts, tables: &ChoiceTables) -> Option<Digest> {
         tables.images(*facts).map(SentImages::digest)
     }
 
@@ -50,12 +50,11 @@ impl StoredDetail for ChoiceDetail {
     }
 
     fn source(&self) -> &str {
-        let frame: &FrameId = self.shown();
-        &frame.0
+        &self.sent_frame().0
     }
 
-    fn shown(&self) -> Option<Digest> {
-        self.sent()
+    fn sent_digest(&self) -> Option<Digest> {
+        self.file_digest()
     }
 }
 
@@ -78,7 +77,7 @@ impl StoredDetail for OpenDetail {
         }
     }
 
-    fn keep(record: &Record<Self>, (): &mut ()) -> Self::Facts {
+    fn extract_facts(record: &Record<Self>, (): &mut ()) -> Self::Facts {
         Box::new(record.clone())
     }
 
@@ -90,8 +89,8 @@ impl StoredDetail for OpenDetail {
         None
     }
 
-    fn sent_of(record: &Self::Facts, (): &()) -> Option<Digest> {
-        record.detail.shown()
+    fn sent_digest_of(record: &Self::Facts, (): &()) -> Option<Digest> {
+        record.detail.sent_digest()
     }
 
     fn choices(&self) -> &[String] {
@@ -106,7 +105,7 @@ impl StoredDetail for OpenDetail {
         &self.episode
     }
 
-    fn shown(&self) -> Option<Digest> {
+    fn sent_digest(&self) -> Option<Digest> {
         self.images.as_ref().map(|images| images.digest)
     }
 }

@@ -23,18 +23,18 @@ pub struct Thumbnail {
     pub crop: String,
     /// The gain that brightens the crop, in EV.
     pub stops: f32,
-    /// The width and height of the frame, in whose pixels boxes of evidence are; not in the file for several frames.
+    /// The width and height of the frame in pixels, the unit of boxes in evidence; not in the file for several frames.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub size: Option<[u32; 2]>,
-    /// The things that questions are about, each at full resolution and brightened as `crop` is; not in the file without any.
+    /// Crops of the objects that questions are about, at full resolution and brightened as `crop` is; not in the file if empty.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub objects: Vec<ObjectCrop>,
 }
 
-/// A thing that a question is about, cut out of an image as it was sent.
+/// An object that a question is about, cropped from an image as it was sent.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ObjectCrop {
-    /// The box of the thing, in pixels of the frame.
+    /// The box of the object, in pixels of the frame.
     pub object: PixelBox,
     /// Crop of the object and its surroundings, as a `data:` URL.
     pub crop: String,

@@ -23,14 +23,14 @@ pub struct Record<D> {
     pub model: String,
     /// Whether the model was shown the images.
     pub view: View,
-    /// The condition of the images; `None` if the model was shown none. Further columns of the line follow from it.
+    /// The condition of the images; `None` if the model was shown none. Written to the file as several columns ([`ConditionColumns`]).
     #[serde(flatten, serialize_with = "condition_columns")]
     pub condition: Option<Condition>,
     /// The text of the reply; `None` if no reply came.
     pub reply: Option<String>,
     /// The text of a refusal that the server sent separately from the reply.
     pub refusal: Option<String>,
-    /// The reason why the model stopped; `None` if no reply came, except for an attempt that broke off.
+    /// The reason why the model stopped; `None` if no reply came, unless the last attempt broke off in the middle.
     pub finish: Option<Finish>,
     /// The way in which the model was asked; not in the file if it was asked directly.
     #[serde(skip_serializing_if = "Via::is_direct")]
@@ -88,16 +88,16 @@ pub trait StoredDetail: Clone + PartialEq + Serialize + Send {
     fn asked(&self) -> AskedParts<'_>;
 
     /// Extracts the facts that reports keep of a record.
-    fn keep(record: &Record<Self>, tables: &mut Self::Tables) -> Self::Facts;
+    fn extract_facts(record: &Record<Self>, tables: &mut Self::Tables) -> Self::Facts;
 
-    /// The same facts, which refer to other tables.
+    /// Copies facts into other tables.
     fn move_facts(facts: &Self::Facts, from: &Self::Tables, to: &mut Self::Tables) -> Self::Facts;
 
     /// Name of the frame or walk that was shown, if it differs from the frame that was asked about.
     fn source_of<'t>(facts: &'t Self::Facts, tables: &'t Self::Tables) -> Option<&'t str>;
 
     /// Digest of the images sent; `None` if no image was sent or the digest is unknown.
-    fn sent_of(facts: &Self::Facts, tables: &Self::Tables) -> Option<Digest>;
+    fn sent_digest_of(facts: &Self::Facts, tables: &Self::Tables) -> Option<Digest>;
 
     /// The choices in the order shown; empty if the question is open.
     fn choices(&self) -> &[String];
@@ -109,7 +109,7 @@ pub trait StoredDetail: Clone + PartialEq + Serialize + Send {
     fn source(&self) -> &str;
 
     /// Digest of the images sent; `None` if no image was sent or the digest is unknown.
-    fn shown(&self) -> Option<Digest>;
+    fn sent_digest(&self) -> Option<Digest>;
 }
 
 impl<'de, D: StoredDetail> Deserialize<'de> for Record<D> {
@@ -119,7 +119,7 @@ impl<'de, D: StoredDetail> Deserialize<'de> for Record<D> {
 }
 
 impl<D> Record<D> {
-    /// The record of a trial without a result; without a condition the model is shown no image.
+    /// The record of a trial without a result yet. Without a condition the model is shown no image.
     #[must_use]
     pub fn blank(
         key: TrialKey,
@@ -169,7 +169,7 @@ impl<D> Record<D> {
 
     /// The record with a failure after this number of requests.
     #[must_use]
-    pub fn failed_by(self, failure: Failure, attempts: u32) -> Self {
+    pub fn with_failure(self, failure: Failure, attempts: u32) -> Self {
         Self {
             failure: Some(failure),
             attempts,
@@ -179,7 +179,7 @@ impl<D> Record<D> {
 
     /// The record, marked as asked in a batch.
     #[must_use]
-    pub fn batched(self) -> Self {
+    pub fn in_batch(self) -> Self {
         Self {
             via: Via::Batch,
             ..self

@@ -4,12 +4,12 @@ use serde::{Deserialize, Deserializer};
 
 use crate::types::replies::Usage;
 
-/// A number that may be unknown. One above 4,294,967,294 is taken as that.
+/// An optional number in four bytes. Larger numbers become the maximum, 4,294,967,294.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SmallNumber(u32);
 
 impl SmallNumber {
-    /// The number that is not known.
+    /// An unknown number.
     pub const UNKNOWN: Self = Self(u32::MAX);
 
     /// The number; `None` if it is not known.
@@ -31,14 +31,14 @@ impl From<Option<u64>> for SmallNumber {
     }
 }
 
-/// Read as the number itself or `null`.
+/// Reads a number or `null`.
 impl<'de> Deserialize<'de> for SmallNumber {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         Option::<u64>::deserialize(deserializer).map(Self::from)
     }
 }
 
-/// The tokens that a server charged.
+/// The tokens that a server charged, as a [`Usage`] in twelve bytes, without the total.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Tokens {
     prompt: SmallNumber,
@@ -70,7 +70,7 @@ impl Tokens {
     }
 }
 
-/// Read as [`Usage`] or `null`.
+/// Reads a [`Usage`] or `null`.
 impl<'de> Deserialize<'de> for Tokens {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         Option::<Usage>::deserialize(deserializer).map(Self::from)
@@ -95,11 +95,14 @@ mod tests {
             prompt_tokens: Some(u64::MAX),
             ..usage
         };
-        let read = Tokens::from(Some(large)).usage().unwrap();
-        assert_eq!(read.prompt_tokens, Some(u64::from(u32::MAX) - 1));
-        let read: Tokens = serde_json::from_str(r#"{"prompt_tokens":3}"#).unwrap();
-        assert_eq!(read.usage().and_then(|usage| usage.prompt_tokens), Some(3));
-        let read: Tokens = serde_json::from_str("null").unwrap();
-        assert_eq!(read.usage(), None);
+        let capped = Tokens::from(Some(large)).usage().unwrap();
+        assert_eq!(capped.prompt_tokens, Some(u64::from(u32::MAX) - 1));
+        let parsed: Tokens = serde_json::from_str(r#"{"prompt_tokens":3}"#).unwrap();
+        assert_eq!(
+            parsed.usage().and_then(|usage| usage.prompt_tokens),
+            Some(3)
+        );
+        let parsed: Tokens = serde_json::from_str("null").unwrap();
+        assert_eq!(parsed.usage(), None);
     }
 }

@@ -38,16 +38,15 @@ impl FromStr for TrialKey {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self, Error> {
-        let digits = text.len() == 32 && text.bytes().all(|b| b.is_ascii_hexdigit());
-        let key = digits
-            .then(|| u128::from_str_radix(text, 16).ok())
-            .flatten();
-        key.map(|key| Self(key.to_be_bytes())).ok_or_else(|| {
-            Error::data(
-                "key",
-                format_args!("{text:?} is not a key of 32 hexadecimal digits"),
-            )
-        })
+        // `from_str_radix` would accept a sign.
+        if text.len() == 32
+            && text.bytes().all(|b| b.is_ascii_hexdigit())
+            && let Ok(key) = u128::from_str_radix(text, 16)
+        {
+            return Ok(Self(key.to_be_bytes()));
+        }
+        let problem = format_args!("{text:?} is not a key of 32 hexadecimal digits");
+        Err(Error::data("key", problem))
     }
 }
 

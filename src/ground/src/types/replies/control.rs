@@ -6,27 +6,26 @@ use std::str::FromStr;
 /// Name of the observer in records and tables.
 pub const OBSERVER: &str = "observer";
 
-/// A way to spoil an image.
+/// A control of the observer: a change of the image after which the observer should know less.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Control {
-    /// The image of a frame of another scene in the same condition. It is shown by the plan of the run; the image is not changed.
+    /// The unchanged image of a frame from another scene in the same condition; the plan of the run chooses it.
     OtherRoom,
-    /// Means of squares of 12 pixels. This is a limit, and not always chance: it is the right image without detail, and of large
-    /// things enough is left.
+    /// Each square of 12 pixels filled with its mean. The score may stay above chance, because large things are still visible.
     Mosaic12,
-    /// Means of squares of 40 pixels.
+    /// Each square of 40 pixels filled with its mean.
     Mosaic40,
     /// Left and right exchanged.
     Mirrored,
     /// Top and bottom exchanged.
     UpsideDown,
-    /// Squares of 80 pixels, none of them in its place.
+    /// Squares of 80 pixels, each moved to another place.
     Tiles,
     /// All pixels black.
     Black,
     /// All pixels the mean colour of the image.
     Flat,
-    /// Independent uniform codes.
+    /// An independent, uniformly distributed code for each sample.
     WhiteNoise,
     /// Noise with the same power in each octave, like that of natural images.
     PinkNoise,
@@ -34,11 +33,11 @@ pub enum Control {
     Negative,
     /// Blurred by about σ = 20 pixels.
     Blur,
-    /// Shifted by 32 pixels to the right and down, around the edges.
+    /// Shifted by 32 pixels to the right and down; pixels wrap around the edges.
     Shift32,
-    /// Shifted by 4 pixels to the right and down. This is a limit, too: some outlines still agree.
+    /// Shifted by 4 pixels to the right and down. The score may stay above chance, because some outlines still agree.
     Shift4,
-    /// Each mask filled with a colour at random.
+    /// Each mask filled with a random colour.
     RandomMasks,
     /// The outlines of the masks, black on grey.
     Outlines,
@@ -65,17 +64,17 @@ impl Control {
         Self::Outlines,
     ];
 
-    /// True if the image carries no information, so that the score must be at chance. The other controls are limits of the observer.
+    /// True if the image carries no information about the question, so that the score must be at chance.
     #[must_use]
-    pub fn leaves_nothing(self) -> bool {
+    pub fn removes_all_information(self) -> bool {
         !matches!(self, Self::Shift4 | Self::Mosaic12)
     }
 
-    /// Default controls of a run with the observer, which asks the first that is possible: other-room, or the tiles of the right image if
-    /// all frames are of one scene.
-    pub const STANDING: [Self; 2] = [Self::OtherRoom, Self::Tiles];
+    /// Controls that a run with the observer asks by default: the first that is possible, which is `other-room`, or `tiles` if all frames
+    /// are from one scene.
+    pub const DEFAULTS: [Self; 2] = [Self::OtherRoom, Self::Tiles];
 
-    /// The control that a model name names, also with a run behind it, as `observer:tiles (night)`; `None` for all other models.
+    /// The control in a model name such as `observer:tiles`, or `observer:tiles (night)` with the name of a run; `None` for other models.
     pub fn from_model_name(model: &str) -> Option<Self> {
         let name = model.strip_prefix(OBSERVER)?.strip_prefix(':')?;
         name.split_once(" (")

@@ -22,23 +22,27 @@ pub enum Finish {
 }
 
 impl Finish {
-    /// The longest reason in a server's words, in characters; chosen.
-    const LONGEST: usize = 40;
+    /// Maximum length of a reason in a server's words, in characters; chosen.
+    const MAX_REASON_CHARS: usize = 40;
 
-    /// The same reason; one in the server's words is shortened, and has no control characters.
+    /// Shortens a reason in the server's words and removes its control characters.
     #[must_use]
-    pub fn shortened(self) -> Self {
+    pub fn shorten(self) -> Self {
         match self {
             Self::Other(reason) => {
-                let shown = reason.chars().filter(|c| !c.is_control());
-                Self::Other(shown.take(Self::LONGEST).collect())
+                let reason = reason
+                    .chars()
+                    .filter(|c| !c.is_control())
+                    .take(Self::MAX_REASON_CHARS)
+                    .collect();
+                Self::Other(reason)
             }
             named => named,
         }
     }
 }
 
-/// The tokens that the server charged for a request; `None` where it did not report them.
+/// The tokens that the server charged for a request; each number is `None` if the server did not report it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash, Serialize, Deserialize)]
 pub struct Usage {
     /// The number of tokens in the prompt, image included.
@@ -54,7 +58,7 @@ pub struct Usage {
 }
 
 impl Usage {
-    /// The sum of both numbers; `None` if the server stated neither.
+    /// The sum of prompt and reply tokens; `None` if the server stated neither.
     #[must_use]
     pub fn total(&self) -> Option<u64> {
         let (prompt, completion) = (self.prompt_tokens, self.completion_tokens);
@@ -62,13 +66,9 @@ impl Usage {
             .then(|| prompt.unwrap_or(0).saturating_add(completion.unwrap_or(0)))
     }
 
-    /// The tokens of both; a number is unknown if neither has it.
+    /// Adds two usages; a number is unknown if it is unknown in both.
     #[must_use]
     pub fn plus(self, more: Self) -> Self {
-        let sum = |one: Option<u64>, other: Option<u64>| match (one, other) {
-            (Some(one), Some(other)) => Some(one.saturating_add(other)),
-            (one, other) => one.or(other),
-        };
         Self {
             prompt_tokens: sum(self.prompt_tokens, more.prompt_tokens),
             completion_tokens: sum(self.completion_tokens, more.completion_tokens),
@@ -78,21 +78,29 @@ impl Usage {
     }
 }
 
+/// Adds two numbers of which each may be unknown.
+fn sum(one: Option<u64>, other: Option<u64>) -> Option<u64> {
+    match (one, other) {
+        (Some(one), Some(other)) => Some(one.saturating_add(other)),
+        (one, other) => one.or(other),
+    }
+}
+
 /// Charged attempts without a reply, with their tokens; and requests for which the server stated no tokens.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash, Serialize, Deserialize)]
 pub struct LostAttempts {
     /// The number of attempts.
     pub attempts: u32,
-    /// The tokens of all of them.
+    /// The tokens of all attempts.
     pub usage: Usage,
-    /// Number of possibly charged requests, that of the reply included, for which the server stated no tokens. Absent in the file if there
-    /// are none.
+    /// Requests that may have been charged although the server stated no tokens, the request of the reply included. Absent in the file if
+    /// there are none.
     #[serde(default, skip_serializing_if = "Unstated::is_none")]
     pub unstated: Unstated,
 }
 
 impl LostAttempts {
-    /// Whether there is none.
+    /// True if no attempt was lost and the tokens of every request are known.
     #[must_use]
     pub fn is_none(&self) -> bool {
         self.attempts == 0 && self.unstated.is_none()
@@ -106,7 +114,7 @@ impl LostAttempts {
         }
     }
 
-    /// All attempts of both.
+    /// Adds the attempts of two trials.
     #[must_use]
     pub fn plus(self, more: Self) -> Self {
         Self {
@@ -129,13 +137,13 @@ pub struct Unstated {
 }
 
 impl Unstated {
-    /// Whether there is none.
+    /// True if the server stated the tokens of every request.
     #[must_use]
     pub fn is_none(&self) -> bool {
         self.requests == 0
     }
 
-    /// The requests of both.
+    /// Adds two counts.
     #[must_use]
     pub fn plus(self, more: Self) -> Self {
         Self {
@@ -169,11 +177,11 @@ pub struct Reply {
     pub latency_ms: u64,
     /// The number of requests that were sent.
     pub attempts: u32,
-    /// The attempts before it that were charged and gave no reply.
+    /// The earlier attempts that were charged and gave no reply.
     pub lost: LostAttempts,
     /// The observer's view of the frame; `None` for every other model.
     pub observed: Option<Observed>,
-    /// The likeliest tokens; `None` if the server was not asked for them or stated none.
+    /// The likeliest tokens; `None` if they were not requested or the server stated none.
     pub chances: Option<TokenChances>,
 }
 

@@ -1,4 +1,4 @@
-//! The place of one of several images in a text, `<image 2>`: [`mark`], [`pieces`].
+//! Marks such as `<image 2>` for the places of images in a text: [`mark`] writes one, [`pieces`] splits a text at them.
 
 use std::sync::LazyLock;
 
@@ -18,18 +18,19 @@ pub fn mark(index: usize) -> String {
     format!("<image {}>", index + 1)
 }
 
-/// The form of [`mark`], without leading zeros.
+/// Matches a [`mark`] whose number has no leading zeros.
 static MARK: LazyLock<Option<Regex>> =
     LazyLock::new(|| Regex::new("<image ([1-9][0-9]{0,3})>").ok());
 
-/// The pieces of a text in order. A mark that `is_place` refuses, by the index of its image, is words.
+/// Splits a text at its marks. A mark stays part of the words if `is_place` returns false for the index of its image.
 pub fn pieces(text: &str, mut is_place: impl FnMut(usize) -> bool) -> Vec<MarkedPiece<'_>> {
     let mut pieces = Vec::new();
     let mut end = 0;
-    let found = MARK.iter().flat_map(|mark| mark.captures_iter(text));
-    let marks =
-        found.filter_map(|found| Some((found.get(0)?, found[1].parse::<usize>().ok()? - 1)));
-    for (place, index) in marks {
+    for captures in MARK.iter().flat_map(|mark| mark.captures_iter(text)) {
+        let (Some(place), Ok(number)) = (captures.get(0), captures[1].parse::<usize>()) else {
+            continue;
+        };
+        let index = number - 1;
         if !is_place(index) {
             continue;
         }

@@ -1,13 +1,13 @@
-//! Text: words of types, text from outside, spelling suggestions and quoting.
+//! Text: enum values as words, escaping of untrusted text, spelling suggestions and shell quoting.
 
+mod escape;
 #[cfg(feature = "program")]
 pub mod image_mark;
 pub mod near_name;
 mod shell;
-mod shown_text;
 mod toml_fault;
 pub mod words;
 
+pub use escape::{escape_hidden, escape_hidden_except_styles, escape_where, excerpt, is_hidden};
 pub use shell::shell_word;
-pub use shown_text::{excerpt, is_hidden, shown, shown_in_colours, written_out};
 pub use toml_fault::{TomlFault, line_at};

@@ -2,44 +2,44 @@
 
 use strsim::{damerau_levenshtein, jaro_winkler};
 
-/// Least similarity of two names, by Jaro and Winkler; chosen.
-const ALIKE: f64 = 0.8;
+/// Minimum Jaro–Winkler similarity of two names for a suggestion; chosen.
+const MIN_SIMILARITY: f64 = 0.8;
 
-/// The most similar of the known names, whatever the case, and the first of equally similar ones; `None` if none is similar.
+/// The most similar of the known names, ignoring case; the first of equally similar ones, and `None` if none is similar.
 pub fn nearest<'a, S: AsRef<str> + 'a>(
     name: &str,
     known: impl IntoIterator<Item = &'a S>,
 ) -> Option<&'a str> {
     let name = name.to_lowercase();
-    let alike = known
+    known
         .into_iter()
         .map(AsRef::as_ref)
-        .map(|other| (jaro_winkler(&name, &other.to_lowercase()), other));
-    let near = alike.filter(|(alike, _)| *alike > ALIKE);
-    // `min_by` returns the first of equal elements, `max_by` the last.
-    let nearest = near.min_by(|(a, _), (b, _)| b.total_cmp(a));
-    nearest.map(|(_, other)| other)
+        .map(|other| (jaro_winkler(&name, &other.to_lowercase()), other))
+        .filter(|(similarity, _)| *similarity > MIN_SIMILARITY)
+        // `min_by` returns the first of equal elements, `max_by` the last.
+        .min_by(|(a, _), (b, _)| b.total_cmp(a))
+        .map(|(_, other)| other)
 }
 
-/// The longest word for which one edit makes another word; longer ones take two. Chosen.
-const SHORT: usize = 6;
+/// Length in bytes up to which a word may have one typing error; longer words may have two. Chosen.
+const SHORT_WORD: usize = 6;
 
-/// Whether a word is a known one, or that with a typing error.
+/// True if a word equals a known one except for one typing error, or two in a long word.
 pub fn is_nearly(word: &str, known: &str) -> bool {
-    let most = if known.len() <= SHORT { 1 } else { 2 };
-    damerau_levenshtein(known, word) <= most
+    let most_errors = if known.len() <= SHORT_WORD { 1 } else { 2 };
+    damerau_levenshtein(known, word) <= most_errors
 }
 
-/// The most similar of the known names, as a [`question`].
+/// [`did_you_mean`] for the most similar of the known names.
 pub fn suggestion<'a, S: AsRef<str> + 'a>(
     name: &str,
     known: impl IntoIterator<Item = &'a S>,
 ) -> String {
-    question(nearest(name, known))
+    did_you_mean(nearest(name, known))
 }
 
-/// Whether a name was meant, as a question at the end of a message; empty without a name.
-pub fn question(meant: Option<&str>) -> String {
+/// The end of a message that suggests a name: `; did you mean NAME?`. Empty without a name.
+pub fn did_you_mean(meant: Option<&str>) -> String {
     meant.map_or_else(String::new, |meant| format!("; did you mean {meant}?"))
 }
 
@@ -48,7 +48,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_most_similar_name_is_found_and_no_other() {
+    fn only_similar_names_are_suggested() {
         let known = [
             "lift",
             "gray-gain",

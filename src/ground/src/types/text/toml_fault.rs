@@ -2,33 +2,35 @@
 
 use super::near_name::suggestion;
 
-/// Where a text is not the TOML that was expected, and why.
+/// The line and the description of an error in a TOML text.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TomlFault {
     /// The line, from 1.
     pub line: usize,
-    /// The problem on one line, with the key that an unknown one is most similar to.
+    /// The description on one line; for an unknown key with the most similar known key.
     pub problem: String,
 }
 
 impl TomlFault {
-    /// The fault of a text, as the parser found it.
+    /// Describes the parser's error about a text.
     pub fn new(text: &str, error: &toml::de::Error) -> Self {
         let message: Vec<&str> = error.message().lines().map(str::trim).collect();
         Self {
             line: line_at(text, error.span().map_or(0, |span| span.start)),
-            problem: message.join(", ") + &meant(error.message()) + quotes(error.message()),
+            problem: message.join(", ")
+                + &suggested_key(error.message())
+                + quoting_hint(error.message()),
         }
     }
 }
 
-/// The line, from 1, of a place in a text.
+/// The line, from 1, of a byte offset in a text.
 pub fn line_at(text: &str, start: usize) -> usize {
     text.get(..start).unwrap_or_default().matches('\n').count() + 1
 }
 
-/// The known key that an unknown one is most similar to, as a question; empty if the message is about something else.
-fn meant(message: &str) -> String {
+/// Suggestion of the most similar known key if the message is about an unknown one; otherwise empty.
+fn suggested_key(message: &str) -> String {
     let names: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
     match &*names {
         [unknown, known @ ..] if message.starts_with("unknown field") => suggestion(unknown, known),
@@ -36,8 +38,8 @@ fn meant(message: &str) -> String {
     }
 }
 
-/// Hint to quote a text that the parser took for a number or a date; other errors carry their own hint.
-fn quotes(message: &str) -> &'static str {
+/// Hint to quote a text that the parser tried to read as a number or a date; empty for other errors, which need no hint.
+fn quoting_hint(message: &str) -> &'static str {
     let is_number = ["invalid fraction", "invalid float", "invalid integer"]
         .iter()
         .any(|problem| message.starts_with(problem));
@@ -65,7 +67,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fault_has_its_line_and_says_how_to_mend_it() {
+    fn faults_have_a_line_and_a_hint() {
         for (text, line, part) in [
             ("\nrange = \"0..1\"", 2, "; did you mean range_in?"),
             ("range_in = 0..1", 1, "; a text stands in quotes"),

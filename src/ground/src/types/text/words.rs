@@ -1,4 +1,4 @@
-//! Macros for types that are written as a word or a text and read back: [`words`], [`as_text`].
+//! Macros for types that are written as text and parsed from it: [`words`], [`as_text`].
 
 use std::fmt;
 use std::marker::PhantomData;

@@ -5,13 +5,13 @@ use serde::Serialize;
 use serde::ser::Error as _;
 use serde_json::{Error, Value};
 
-/// The JSON of a value, whose compact text is the canonical one: keys are sorted, and `null`s and absent fields are left out at every depth. A new field that
-/// is `None` therefore changes no digest.
+/// The canonical JSON of a value: keys are sorted, and fields that are `null` or absent are left out at every depth. Adding a field that is
+/// `None` therefore changes no digest.
 ///
-/// Floats are written in the shortest form that reads back (serde_json); an `f32` is written as its shortest decimal.
+/// Floats have the shortest decimal form that parses to the same number, an `f32` that of the `f32`.
 ///
 /// # Errors
-/// If a number is infinite or NaN, or a key is not a text.
+/// If a number is infinite or NaN, or a key is not a string.
 pub(super) fn canonical(value: &impl Serialize) -> Result<Value, Error> {
     let content = Content::serialized(value).map_err(Error::custom)?;
     if !is_finite(&content) {
@@ -23,7 +23,7 @@ pub(super) fn canonical(value: &impl Serialize) -> Result<Value, Error> {
     Ok(value)
 }
 
-/// Whether all numbers are finite; serde_json would write `null` for the others.
+/// True if all numbers are finite; serde_json would write `null` for the others.
 fn is_finite(content: &Content) -> bool {
     match content {
         Content::Float(number) => number.is_finite(),
@@ -102,9 +102,10 @@ mod tests {
             name: &'static str,
         }
         let before = canonical(&[Before { name: "a" }]).unwrap();
-        let after = |added| canonical(&[After { added, name: "a" }]).unwrap();
-        assert_eq!(before, after(None));
-        assert_ne!(before, after(Some(0)));
+        let [none, some] =
+            [None, Some(0)].map(|added| canonical(&[After { added, name: "a" }]).unwrap());
+        assert_eq!(before, none);
+        assert_ne!(before, some);
     }
 
     #[test]

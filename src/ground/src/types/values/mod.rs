@@ -1,4 +1,4 @@
-//! Values: digests, canonical JSON, and values that are kept once.
+//! Digests, canonical JSON, a cache, and shared values.
 
 #[cfg(feature = "program")]
 mod canonical;

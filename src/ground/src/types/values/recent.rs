@@ -1,19 +1,19 @@
-//! A small cache of recent values: [`Recent`].
+//! A small cache that evicts the oldest value first: [`Recent`].
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// A cache of the `capacity` values that were added last. A thread waits for a value that another thread is computing.
+/// A first-in, first-out cache of at most `capacity` values. If another thread is already computing a value, `get` waits for it.
 ///
-/// The oldest value is removed first. Caches of libraries consider how often a value is used (quick_cache was tried): with a
-/// capacity of one or two large frames they reject a new frame, although it is needed next.
+/// Cache crates consider how often a value is used (quick_cache was tried): with a capacity of one or two large frames they reject a new
+/// frame, although it is needed next.
 #[derive(Debug)]
 pub struct Recent<K, V> {
     capacity: usize,
     slots: Mutex<VecDeque<(K, Slot<V>)>>,
 }
 
-/// A value; `None` until it is computed.
+/// A cached value; `None` until it is computed.
 type Slot<V> = Arc<Mutex<Option<V>>>;
 
 impl<K: PartialEq + Clone, V: Clone> Recent<K, V> {
@@ -23,17 +23,17 @@ impl<K: PartialEq + Clone, V: Clone> Recent<K, V> {
         Self { capacity, slots }
     }
 
-    /// The value of a key, computed by `make` if it is not cached. Errors are not cached.
+    /// The value of a key, computed by `compute` if it is not cached. Errors are not cached.
     ///
     /// # Errors
-    /// Errors of `make`.
-    pub fn get<E>(&self, key: &K, make: impl FnOnce() -> Result<V, E>) -> Result<V, E> {
+    /// Errors of `compute`.
+    pub fn get<E>(&self, key: &K, compute: impl FnOnce() -> Result<V, E>) -> Result<V, E> {
         let slot = self.slot(key);
         let mut value = slot.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(value) = &*value {
             return Ok(value.clone());
         }
-        let new = make()?;
+        let new = compute()?;
         *value = Some(new.clone());
         Ok(new)
     }

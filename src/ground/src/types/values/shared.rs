@@ -1,4 +1,4 @@
-//! A value that many records hold, kept once: [`Shared`].
+//! Immutable values that many records share: [`Shared`], and their deduplication: [`Distinct`].
 
 use std::collections::HashSet;
 use std::fmt;
@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// A value that several owners share and none changes. It is read and written as the value itself.
+/// An immutable value with several owners, an [`Arc`] that is serialized as the value itself.
 #[derive(PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Shared<T>(Arc<T>);
 
@@ -68,7 +68,7 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for Shared<T> {
     }
 }
 
-/// The distinct values of one kind that were seen so far.
+/// A set of shared values, to replace equal values by one.
 #[derive(Debug)]
 pub struct Distinct<T>(HashSet<Shared<T>>);
 
@@ -85,7 +85,7 @@ impl<T> Default for Distinct<T> {
 }
 
 impl<T: Eq + Hash> Distinct<T> {
-    /// Puts the first of all equal values in the place of this one.
+    /// Replaces a value by the first equal one, if there was one.
     pub fn share(&mut self, value: &mut Shared<T>) {
         if let Some(first) = self.0.get(value) {
             *value = first.clone();
@@ -100,7 +100,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn equal_values_are_kept_once() {
+    fn equal_values_share_memory() {
         let mut distinct = Distinct::default();
         let [mut one, mut other, mut same] =
             ["a", "b", "a"].map(|text| Shared::from(text.to_owned()));

@@ -109,7 +109,7 @@ impl<'a> LightAnswers<'a> {
             .by_question
             .get(&key)?
             .iter()
-            .find(|light| RunGroup::meet(group(**light).as_ref(), own.as_ref()))?;
+            .find(|light| RunGroup::overlap(group(**light).as_ref(), own.as_ref()))?;
         chosen(*light, mode)
     }
 
@@ -191,7 +191,7 @@ fn with_references<'t>(
 ) -> Trials<ChoiceDetail> {
     let mut trials = Trials::default();
     for (trial, repeat, reference) in scored {
-        trials.hold(trial, repeat, reference);
+        trials.add_scored_against(trial, repeat, reference);
     }
     trials
 }

@@ -10,11 +10,11 @@ use crate::types::{Family, FrameId, QuestionId, Shared};
 pub struct AskedItem {
     /// The name of the question.
     pub question: Shared<QuestionId>,
-    /// The frame of the question; of an open question its walk.
+    /// The frame of the question, or the walk of an open question.
     pub frame: Shared<FrameId>,
-    /// The family of the question; of an open question its category.
+    /// The family of the question, or the category of an open question.
     pub family: Shared<Family>,
-    /// The choices in the order shown; none of an open question.
+    /// The choices in the order shown; empty for an open question.
     pub choices: Shared<Vec<String>>,
     /// The index of the true choice; `None` if nobody knows it.
     pub truth: Option<usize>,
@@ -22,7 +22,7 @@ pub struct AskedItem {
     pub repeat: u32,
 }
 
-/// The fields of a record's item, without the question.
+/// The fields of an [`AskedItem`] without the question, borrowed from a record.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct AskedParts<'r> {
     /// The name of the frame or walk.
@@ -56,7 +56,7 @@ impl AskedItem {
         }
     }
 
-    /// The item's fields as a record holds them.
+    /// The question and the other fields, as a record contains them.
     pub(super) fn parts(&self) -> (&QuestionId, AskedParts<'_>) {
         let parts = AskedParts {
             frame: &self.frame.0,
@@ -69,7 +69,7 @@ impl AskedItem {
     }
 }
 
-/// As its parts, so that an item is found by them.
+/// Equals the hash of its parts, so that an item is found without building another one.
 impl Hash for AskedItem {
     fn hash<H: Hasher>(&self, state: &mut H) {
         self.parts().hash(state);

@@ -1,4 +1,4 @@
-//! The model, condition and image of a trial ([`AskedModel`]), and how the trial ended ([`Ending`]).
+//! The model and condition of a trial ([`AskedModel`]), and how the trial ended ([`Ending`]).
 
 use crate::types::Condition;
 use crate::types::LostAttempts;
@@ -9,11 +9,11 @@ use crate::types::records::record::{FailureKind, Via, View};
 pub(super) struct AskedModel {
     pub(super) model: String,
     pub(super) view: View,
-    /// `None` without images.
+    /// The condition of the images; `None` without images.
     pub(super) condition: Option<Condition>,
 }
 
-/// How a trial ended, as many trials do.
+/// How a trial ended. Many trials share one value.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(super) struct Ending {
     /// The model's name in the server's reply.
@@ -27,7 +27,7 @@ pub(super) struct Ending {
     pub(super) broken_off: Option<String>,
     /// Number of requests that were sent.
     pub(super) attempts: u32,
-    /// The attempts that were charged and gave no reply, or one that was asked again.
+    /// The attempts that were charged and gave no reply, or a reply that was replaced by asking again.
     pub(super) lost: LostAttempts,
     /// Token limit of the reply if it exceeds that of the run's first call.
     pub(super) max_tokens: Option<u32>,

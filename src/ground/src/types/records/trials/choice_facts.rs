@@ -2,21 +2,21 @@
 
 use std::collections::BTreeMap;
 
+use super::interner::Interner;
 use super::sent_images::SentImages;
-use super::values::Values;
 use crate::types::questions::{UnreadReason, letter};
 use crate::types::{
     AnswerReading, ChoiceDetail, FrameId, Observed, OptionProbabilities, Record, TrialOutcome,
 };
 
-/// A number that stands for none.
+/// The index that means "no entry".
 const NONE: u32 = u32::MAX;
 
-/// Answers parsed from the reply to a question with choices.
+/// The result of one trial with choices. Numbers are indices into [`ChoiceTables`].
 #[derive(Debug, Clone, Copy)]
 pub struct ChoiceFacts {
     images: u32,
-    more: u32,
+    rare: u32,
     strict: Option<PackedReading>,
     lenient: Option<PackedReading>,
     pub(super) outcome: TrialOutcome,
@@ -53,9 +53,9 @@ impl From<PackedReading> for AnswerReading {
     }
 }
 
-/// Facts that few trials have: the observer's view, and the model's probability of each choice.
+/// Facts that few trials have, as indices: the observer's view, and the model's probability of each choice.
 #[derive(Debug, Clone, Copy)]
-struct More {
+struct RareFacts {
     observed: u32,
     options: u32,
 }
@@ -63,18 +63,18 @@ struct More {
 /// Tables that the facts of trials with choices refer to.
 #[derive(Debug, Clone, Default)]
 pub struct ChoiceTables {
-    images: Values<SentImages>,
-    observed: Values<Observed>,
+    images: Interner<SentImages>,
+    observed: Interner<Observed>,
     options: Vec<OptionProbabilities>,
-    more: Vec<More>,
+    rare: Vec<RareFacts>,
 }
 
 impl ChoiceTables {
-    /// Extracts the facts that reports keep of a record.
-    pub fn keep(&mut self, record: &Record<ChoiceDetail>) -> ChoiceFacts {
+    /// Extracts the facts of a record that reports need.
+    pub fn extract_facts(&mut self, record: &Record<ChoiceDetail>) -> ChoiceFacts {
         let detail = &record.detail;
-        let images = SentImages::from_detail(detail);
-        let images = images.map_or(NONE, |images| self.images.number(images));
+        let images =
+            SentImages::from_detail(detail).map_or(NONE, |images| self.images.intern(images));
         let observed = detail.observed.as_ref().map(|observed| Observed {
             from: observed.from,
             things: observed.things,
@@ -83,12 +83,11 @@ impl ChoiceTables {
             explained_ppm: observed.explained_ppm,
             outlines: BTreeMap::new(),
         });
-        let observed = observed.map_or(NONE, |observed| self.observed.number(observed));
-        let options = detail.options.clone();
+        let observed = observed.map_or(NONE, |observed| self.observed.intern(observed));
         let reply = record.reply.as_deref();
         ChoiceFacts {
             images,
-            more: self.add_more(observed, options),
+            rare: self.add_rare(observed, detail.options.clone()),
             strict: detail.strict.map(PackedReading::from),
             lenient: detail.lenient.map(PackedReading::from),
             outcome: detail.outcome,
@@ -96,29 +95,30 @@ impl ChoiceTables {
         }
     }
 
-    /// The same facts, which refer to other tables.
+    /// Copies facts from other tables into these.
     pub fn move_from(&mut self, facts: ChoiceFacts, other: &Self) -> ChoiceFacts {
         let images = other.images(facts).cloned();
         let observed = other.observed(facts).cloned();
-        let observed = observed.map_or(NONE, |observed| self.observed.number(observed));
+        let observed = observed.map_or(NONE, |observed| self.observed.intern(observed));
         ChoiceFacts {
-            images: images.map_or(NONE, |images| self.images.number(images)),
-            more: self.add_more(observed, other.options(facts).cloned()),
+            images: images.map_or(NONE, |images| self.images.intern(images)),
+            rare: self.add_rare(observed, other.options(facts).cloned()),
             ..facts
         }
     }
 
-    fn add_more(&mut self, observed: u32, options: Option<OptionProbabilities>) -> u32 {
+    /// The index of new rare facts; [`NONE`] if the trial has neither.
+    fn add_rare(&mut self, observed: u32, options: Option<OptionProbabilities>) -> u32 {
         if observed == NONE && options.is_none() {
             return NONE;
         }
         let number = self.options.len() as u32;
-        self.more.push(More {
+        self.rare.push(RareFacts {
             observed,
             options: options.as_ref().map_or(NONE, |_| number),
         });
         self.options.extend(options);
-        self.more.len() as u32 - 1
+        self.rare.len() as u32 - 1
     }
 
     /// The images that were sent.
@@ -133,13 +133,13 @@ impl ChoiceTables {
 
     /// The observer's view, without the outlines of single objects.
     pub(super) fn observed(&self, facts: ChoiceFacts) -> Option<&Observed> {
-        let number = self.more.get(facts.more as usize)?.observed;
+        let number = self.rare.get(facts.rare as usize)?.observed;
         (number != NONE).then(|| self.observed.get(number))
     }
 
-    /// How likely the model held each choice.
+    /// The model's probability of each choice.
     pub(super) fn options(&self, facts: ChoiceFacts) -> Option<&OptionProbabilities> {
-        let number = self.more.get(facts.more as usize)?.options;
+        let number = self.rare.get(facts.rare as usize)?.options;
         self.options.get(number as usize)
     }
 }
@@ -156,7 +156,7 @@ impl ChoiceFacts {
     }
 
     /// The same answers, scored against `reference` instead of the truth. Images and the observer's view are dropped.
-    pub(super) fn held_against(self, reference: usize) -> Self {
+    pub(super) fn scored_against(self, reference: usize) -> Self {
         let outcome = match self.strict() {
             None => TrialOutcome::Failed,
             Some(reading) if reading.chosen == Some(reference) => TrialOutcome::Right,
@@ -165,14 +165,14 @@ impl ChoiceFacts {
         };
         Self {
             images: NONE,
-            more: NONE,
+            rare: NONE,
             outcome,
             ..self
         }
     }
 }
 
-/// Whether a reply is the letter of one of these many choices.
+/// True if a reply is the letter of one of the first `choices` choices and nothing else.
 fn is_letter(reply: &str, choices: usize) -> bool {
     let mut characters = reply.chars();
     let first = characters.next();

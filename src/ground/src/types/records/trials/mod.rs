@@ -1,4 +1,4 @@
-//! The trials of runs as reports need them: [`Trials`], and one of them ([`TrialRef`]).
+//! A compact table of the trials of runs for reports: [`Trials`], with a view of one trial ([`TrialRef`]).
 //!
 //! Facts that many trials share are stored once, and the texts of replies stay in the file of the run. A trial with choices therefore takes
 //! 60 bytes, and 16 more while its key is needed.
@@ -6,11 +6,11 @@
 mod asked_item;
 mod asked_model;
 mod choice_facts;
+mod interner;
 mod sent_images;
 mod text_place;
 mod trial_facts;
 mod trial_ref;
-mod values;
 
 pub use asked_item::{AskedItem, AskedParts};
 pub use choice_facts::{ChoiceFacts, ChoiceTables};
@@ -24,9 +24,9 @@ use std::hash::BuildHasher;
 use asked_model::{AskedModel, Ending};
 use hashbrown::hash_table::Entry;
 use hashbrown::{DefaultHashBuilder, HashTable};
+use interner::Interner;
 use rayon::slice::ParallelSliceMut;
-use trial_facts::{TrialFacts, reply_digest};
-use values::Values;
+use trial_facts::{TrialFacts, hash_reply};
 
 use crate::error::Error;
 
@@ -41,25 +41,25 @@ pub struct Trials<D: StoredDetail> {
     facts: Vec<TrialFacts<D::Facts>>,
     /// The key of each trial; empty if the keys were dropped.
     keys: Vec<TrialKey>,
-    items: Values<AskedItem>,
-    asked: Values<AskedModel>,
-    endings: Values<Ending>,
+    items: Interner<AskedItem>,
+    asked: Interner<AskedModel>,
+    endings: Interner<Ending>,
     tables: D::Tables,
-    /// Number of files of runs that the places of texts refer to.
+    /// Number of record files that the places of texts refer to.
     logs: usize,
     texts: Texts,
 }
 
-/// The trial to keep of two with one key.
+/// Which of two trials with the same key is kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum KeptTrial {
-    /// The one whose text stands first.
+    /// The trial that was added first.
     First,
-    /// The other.
+    /// The trial that was added later.
     Later,
 }
 
-/// The texts that items share.
+/// Texts that several items share.
 #[derive(Debug, Clone, Default)]
 struct Texts {
     questions: Distinct<QuestionId>,
@@ -73,9 +73,9 @@ impl<D: StoredDetail> Default for Trials<D> {
         Self {
             facts: Vec::new(),
             keys: Vec::new(),
-            items: Values::default(),
-            asked: Values::default(),
-            endings: Values::default(),
+            items: Interner::default(),
+            asked: Interner::default(),
+            endings: Interner::default(),
             tables: D::Tables::default(),
             logs: 1,
             texts: Texts::default(),
@@ -84,12 +84,12 @@ impl<D: StoredDetail> Default for Trials<D> {
 }
 
 impl<D: StoredDetail> Trials<D> {
-    /// Adds the trial of a record whose line is at this place.
+    /// Adds the trial of a record; `text` is the place of its line.
     pub fn add(&mut self, record: Record<D>, text: TextPlace) {
-        let facts = D::keep(&record, &mut self.tables);
-        let reply = reply_digest(record.reply.as_deref(), record.refusal.as_deref());
-        let item = self.item_of(&record.question, &record.detail.asked());
-        let asked = self.asked.number(AskedModel {
+        let facts = D::extract_facts(&record, &mut self.tables);
+        let reply = hash_reply(record.reply.as_deref(), record.refusal.as_deref());
+        let item = self.intern_item(&record.question, &record.detail.asked());
+        let asked = self.asked.intern(AskedModel {
             model: record.model,
             view: record.view,
             condition: record.condition,
@@ -99,7 +99,7 @@ impl<D: StoredDetail> Trials<D> {
             Some(Finish::Other(word)) if failure.is_some() => Some(word),
             _ => None,
         };
-        let ending = self.endings.number(Ending {
+        let ending = self.endings.intern(Ending {
             served_model: record.served_model,
             provider: record.provider,
             via: record.via,
@@ -129,19 +129,19 @@ impl<D: StoredDetail> Trials<D> {
         self.facts.len()
     }
 
-    /// Whether there is no trial.
+    /// True if the table contains no trial.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.facts.is_empty()
     }
 
-    /// Number of files of runs that the places of texts refer to.
+    /// Number of record files that the places of texts refer to.
     #[must_use]
     pub fn logs(&self) -> usize {
         self.logs
     }
 
-    /// A trial by its place.
+    /// The trial at a place; `None` beyond the last one.
     #[must_use]
     pub fn get(&self, place: usize) -> Option<TrialRef<'_, D>> {
         (place < self.facts.len()).then(|| TrialRef::new(self, place))
@@ -150,7 +150,7 @@ impl<D: StoredDetail> Trials<D> {
     /// The trial at a place.
     ///
     /// # Panics
-    /// If there is none.
+    /// If the place is beyond the last trial.
     #[must_use]
     pub fn at(&self, place: usize) -> TrialRef<'_, D> {
         assert!(place < self.facts.len(), "a place of {} trials", self.len());
@@ -175,27 +175,27 @@ impl<D: StoredDetail> Trials<D> {
         self.items.get(number as u32)
     }
 
-    /// Number of items, with those that no trial is about any more.
+    /// Number of items, unused ones included.
     pub fn item_count(&self) -> usize {
         self.items.len()
     }
 
-    /// The items that trials are about, by number; `None` for one that no trial is about any more.
+    /// The items by number; `None` for an unused one, whose trials were removed.
     #[must_use]
     pub fn items(&self) -> Vec<Option<&AskedItem>> {
-        let mut is_met = vec![false; self.items.len()];
+        let mut is_used = vec![false; self.items.len()];
         for facts in &self.facts {
-            is_met[facts.item as usize] = true;
+            is_used[facts.item as usize] = true;
         }
         self.items
             .all()
             .iter()
-            .zip(is_met)
-            .map(|(item, is_met)| is_met.then_some(item))
+            .zip(is_used)
+            .map(|(item, is_used)| is_used.then_some(item))
             .collect()
     }
 
-    /// The questions that were asked, with their frames; a question may be met several times.
+    /// The questions that were asked, with their frames; a question may occur several times.
     pub fn questions(&self) -> impl Iterator<Item = (&QuestionId, &FrameId)> {
         self.items()
             .into_iter()
@@ -203,20 +203,22 @@ impl<D: StoredDetail> Trials<D> {
             .map(|item| (&*item.question, &*item.frame))
     }
 
-    /// The models and conditions that were asked, by number, with `None` as [`items`](Self::items).
+    /// The models and conditions that were asked, by number; `None` for an unused one, as in [`items`](Self::items).
     #[must_use]
     pub fn asked(&self) -> Vec<Option<(&str, Option<&Condition>)>> {
-        let mut is_met = vec![false; self.asked.len()];
+        let mut is_used = vec![false; self.asked.len()];
         for facts in &self.facts {
-            is_met[facts.asked as usize] = true;
+            is_used[facts.asked as usize] = true;
         }
-        let asked = self.asked.all().iter().zip(is_met);
-        asked
-            .map(|(asked, is_met)| is_met.then_some((&*asked.model, asked.condition.as_ref())))
+        self.asked
+            .all()
+            .iter()
+            .zip(is_used)
+            .map(|(asked, is_used)| is_used.then_some((&*asked.model, asked.condition.as_ref())))
             .collect()
     }
 
-    /// Gives models other names, where `new` has one.
+    /// Renames each model for which `new` returns a name.
     pub fn rename(&mut self, new: impl Fn(&str) -> Option<String>) {
         for asked in self.asked.all_mut() {
             if let Some(name) = new(&asked.model) {
@@ -234,26 +236,26 @@ impl<D: StoredDetail> Trials<D> {
         }
     }
 
-    /// Keeps some of the trials.
+    /// Keeps the trials that `is_kept` accepts.
     pub fn retain(&mut self, is_kept: impl FnMut(TrialRef<'_, D>) -> bool) {
         let kept: Vec<bool> = self.iter().map(is_kept).collect();
-        self.keep(&kept);
+        self.retain_marked(&kept);
     }
 
     /// Keeps the trials that have `true` at their place.
-    fn keep(&mut self, kept: &[bool]) {
-        let mut of_facts = kept.iter();
-        self.facts.retain(|_| of_facts.next() == Some(&true));
-        let mut of_keys = kept.iter();
-        self.keys.retain(|_| of_keys.next() == Some(&true));
+    fn retain_marked(&mut self, kept: &[bool]) {
+        let mut marks = kept.iter();
+        self.facts.retain(|_| marks.next() == Some(&true));
+        let mut marks = kept.iter();
+        self.keys.retain(|_| marks.next() == Some(&true));
     }
 
-    /// Drops the keys of all trials, which take a fifth of their memory. They are needed to join trials with others.
+    /// Drops the keys of all trials, a fifth of the memory. Only merging with other trials needs them.
     pub fn drop_keys(&mut self) {
         self.keys = Vec::new();
     }
 
-    /// Takes some of the trials out.
+    /// Removes the trials that `is_taken` accepts and returns them.
     #[must_use]
     pub fn extract(&mut self, is_taken: impl Fn(TrialRef<'_, D>) -> bool) -> Self {
         let mut taken = Self {
@@ -269,39 +271,39 @@ impl<D: StoredDetail> Trials<D> {
         taken
     }
 
-    /// Adds a copy of a trial of other runs; `logs` is the number of log files before those of its run.
+    /// Adds a copy of a trial from another table; `logs` is the number of record files before those of its run.
     pub fn copy(&mut self, trial: TrialRef<'_, D>, logs: usize) {
         let other = trial.trials();
         let facts = trial.facts();
-        let item = self.shared(other.items.get(facts.item).clone());
+        let item = self.share_texts(other.items.get(facts.item).clone());
         let new = TrialFacts {
             text: facts.text.after(logs),
-            item: self.items.number(item),
-            asked: self.asked.number(other.asked.get(facts.asked).clone()),
-            ending: self.endings.number(other.endings.get(facts.ending).clone()),
+            item: self.items.intern(item),
+            asked: self.asked.intern(other.asked.get(facts.asked).clone()),
+            ending: self.endings.intern(other.endings.get(facts.ending).clone()),
             facts: D::move_facts(&facts.facts, &other.tables, &mut self.tables),
             ..facts.clone()
         };
-        self.keys.extend(trial.key_if_there());
+        self.keys.extend(trial.key_if_known());
         self.facts.push(new);
         self.logs = self.logs.max(other.logs + logs);
     }
 
-    /// The number of an item.
-    fn item_of(&mut self, question: &QuestionId, parts: &AskedParts<'_>) -> u32 {
+    /// The number of the item with this question and these parts, which is added if it is new.
+    fn intern_item(&mut self, question: &QuestionId, parts: &AskedParts<'_>) -> u32 {
         let key = (question, parts);
-        let known = |item: &AskedItem| {
+        let known = self.items.find(&key, |item| {
             let (known, known_parts) = item.parts();
             (known, &known_parts) == key
-        };
-        self.items.find(&key, known).unwrap_or_else(|| {
-            let item = self.shared(AskedItem::new(question, parts));
+        });
+        known.unwrap_or_else(|| {
+            let item = self.share_texts(AskedItem::new(question, parts));
             self.items.push(item)
         })
     }
 
-    /// The item with the texts that others have.
-    fn shared(&mut self, mut item: AskedItem) -> AskedItem {
+    /// Replaces the texts of an item by equal ones of earlier items.
+    fn share_texts(&mut self, mut item: AskedItem) -> AskedItem {
         self.texts.questions.share(&mut item.question);
         self.texts.frames.share(&mut item.frame);
         self.texts.families.share(&mut item.family);
@@ -309,12 +311,12 @@ impl<D: StoredDetail> Trials<D> {
         item
     }
 
-    /// Keeps one trial of each key. `choose` is called for every two, in the order of their addition. The cost of a dropped trial is added
-    /// to the kept one of the same file.
+    /// Keeps one trial of each key. `choose` decides between two trials with the same key, in the order of their addition. The cost of a
+    /// dropped trial is added to the kept one if both are in the same file.
     ///
     /// # Errors
     /// Errors of `choose`.
-    pub fn each_key_once(
+    pub fn keep_one_per_key(
         &mut self,
         mut choose: impl FnMut(TrialRef<'_, D>, TrialRef<'_, D>) -> Result<KeptTrial, Error>,
     ) -> Result<(), Error> {
@@ -323,9 +325,12 @@ impl<D: StoredDetail> Trials<D> {
         let mut kept = vec![true; self.facts.len()];
         let mut paid = BTreeMap::<usize, LostAttempts>::new();
         for (later, key) in self.keys.iter().enumerate() {
-            let is_same = |place: &u32| self.keys[*place as usize] == *key;
-            let rehash = |place: &u32| hashes.hash_one(self.keys[*place as usize]);
-            match kept_of_key.entry(hashes.hash_one(key), is_same, rehash) {
+            let entry = kept_of_key.entry(
+                hashes.hash_one(key),
+                |place| self.keys[*place as usize] == *key,
+                |place| hashes.hash_one(self.keys[*place as usize]),
+            );
+            match entry {
                 Entry::Vacant(first) => {
                     first.insert(later as u32);
                 }
@@ -350,14 +355,14 @@ impl<D: StoredDetail> Trials<D> {
         for (place, more) in paid.into_iter().filter(|(_, more)| !more.is_none()) {
             let ending = self.endings.get(self.facts[place].ending).clone();
             let lost = ending.lost.plus(more);
-            self.facts[place].ending = self.endings.number(Ending { lost, ..ending });
+            self.facts[place].ending = self.endings.intern(Ending { lost, ..ending });
         }
-        self.keep(&kept);
+        self.retain_marked(&kept);
         Ok(())
     }
 
-    /// Puts the trials in an order: by the places of their questions, their
-    /// conditions, the places of their models, and repeats. Questions and models without a place stand first.
+    /// Sorts the trials by the places of their questions, their conditions, the places of their models, and repeats. Questions without a
+    /// place come first.
     pub fn sort(
         &mut self,
         question: impl Fn(&QuestionId) -> Option<usize>,
@@ -386,23 +391,25 @@ impl<D: StoredDetail> Trials<D> {
             })
             .zip(0..)
             .collect();
-        let rest = |place: u32| {
-            let facts = &self.facts[place as usize];
-            let repeat = self.items.get(facts.item).repeat;
-            (repeat, self.keys.get(place as usize))
-        };
         order.par_sort_unstable_by(|(one_rank, one), (other_rank, other)| {
             let ranks = one_rank.cmp(other_rank);
-            ranks.then_with(|| rest(*one).cmp(&rest(*other)))
+            ranks.then_with(|| self.repeat_and_key(*one).cmp(&self.repeat_and_key(*other)))
         });
-        self.put_in(order.into_iter().map(|(_, place)| place).collect());
+        self.reorder(order.into_iter().map(|(_, place)| place).collect());
     }
 
-    /// Puts the trial of each place in `order` there where its place stands.
-    fn put_in(&mut self, mut order: Vec<u32>) {
+    /// The repeat and key of a trial, which order the trials of one question, condition and model.
+    fn repeat_and_key(&self, place: u32) -> (u32, Option<&TrialKey>) {
+        let facts = &self.facts[place as usize];
+        let repeat = self.items.get(facts.item).repeat;
+        (repeat, self.keys.get(place as usize))
+    }
+
+    /// Reorders the trials: `order` contains the current place of each trial at its new place.
+    fn reorder(&mut self, mut order: Vec<u32>) {
         for start in 0..order.len() {
             let mut to = start;
-            // The trials that take each other's places are a circle: each but the last is exchanged with the one that belongs there.
+            // Follow one cycle of the permutation: each swap moves the right trial to `to`.
             while order[to] as usize != start {
                 let from = order[to] as usize;
                 self.facts.swap(to, from);
@@ -418,33 +425,38 @@ impl<D: StoredDetail> Trials<D> {
 }
 
 impl Trials<ChoiceDetail> {
-    /// Adds a trial with a choice in the place of the truth, without its images.
-    pub fn hold(&mut self, trial: TrialRef<'_, ChoiceDetail>, repeat: u32, reference: usize) {
+    /// Adds a copy of a trial that is scored against the choice `reference` instead of the truth; its images are dropped.
+    pub fn add_scored_against(
+        &mut self,
+        trial: TrialRef<'_, ChoiceDetail>,
+        repeat: u32,
+        reference: usize,
+    ) {
         let other = trial.trials();
         let facts = trial.facts();
-        let item = self.shared(AskedItem {
+        let item = self.share_texts(AskedItem {
             truth: Some(reference),
             repeat,
             ..other.items.get(facts.item).clone()
         });
         let new = TrialFacts {
-            item: self.items.number(item),
-            asked: self.asked.number(other.asked.get(facts.asked).clone()),
-            ending: self.endings.number(Ending {
+            item: self.items.intern(item),
+            asked: self.asked.intern(other.asked.get(facts.asked).clone()),
+            ending: self.endings.intern(Ending {
                 served_model: None,
                 provider: None,
                 via: super::record::Via::Direct,
                 ..other.endings.get(facts.ending).clone()
             }),
-            facts: facts.facts.held_against(reference),
+            facts: facts.facts.scored_against(reference),
             ..facts.clone()
         };
-        self.keys.extend(trial.key_if_there());
+        self.keys.extend(trial.key_if_known());
         self.facts.push(new);
     }
 }
 
-/// The trials of records that are held in memory; the place of a text is the number of its record.
+/// Collects the trials of records in memory; the place of a text is the number of its record.
 impl<D: StoredDetail> FromIterator<Record<D>> for Trials<D> {
     fn from_iter<I: IntoIterator<Item = Record<D>>>(records: I) -> Self {
         let mut trials = Self::default();

@@ -5,27 +5,27 @@ use std::hash::{Hash, Hasher};
 use crate::types::degradations::PairFacts;
 use crate::types::{ChoiceDetail, Digest, FrameId};
 
-/// The images that were sent in one request, as far as reports need them.
+/// Facts about the images sent in one request.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SentImages {
-    /// The digest of the first file.
+    /// The digest of the first image file.
     pub first: Digest,
     /// The number of files and the digest of all, if there are several.
     several: Option<Box<(usize, Digest)>>,
     /// The size of all files in bytes.
     pub bytes: u64,
-    /// How dark the photograph of the frame is, of images in its darkness.
+    /// How dark the photograph of the frame is; only for images of a pair, which are as dark as the photograph.
     pub pair: Option<Box<PairFacts>>,
     /// The frame that was shown, if it differs from that of the question.
     pub(super) shown_frame: Option<FrameId>,
 }
 
 impl SentImages {
-    /// The images of a record; `None` if there are none.
+    /// The images of a record; `None` without images.
     pub(super) fn from_detail(detail: &ChoiceDetail) -> Option<Self> {
         let first = detail.image.as_ref()?;
         let count = detail.images().count();
-        let all = detail.sent().filter(|_| count > 1);
+        let all = detail.file_digest().filter(|_| count > 1);
         Some(Self {
             first: first.digest,
             several: all.map(|all| Box::new((count, all))),
@@ -50,7 +50,7 @@ impl SentImages {
     }
 }
 
-/// By the first file: images are equal only if it is.
+/// Hashes the first file only: equal images have equal first files.
 impl Hash for SentImages {
     fn hash<H: Hasher>(&self, state: &mut H) {
         self.first.hash(state);

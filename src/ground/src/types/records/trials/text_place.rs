@@ -1,6 +1,6 @@
-//! Where the texts of a trial are: [`TextPlace`].
+//! Location of the texts of a trial: [`TextPlace`].
 
-/// The place of the line of a trial in the file of its run, or its number where lines are held in memory.
+/// The byte offset of a trial's line in the file of its run; for records in memory, the number of the record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct TextPlace {
     log: u16,
@@ -9,7 +9,7 @@ pub struct TextPlace {
 }
 
 impl TextPlace {
-    /// A place in the first file.
+    /// A place at an offset in the first file.
     #[must_use]
     pub fn new(start: u64) -> Self {
         Self {
@@ -19,7 +19,7 @@ impl TextPlace {
         }
     }
 
-    /// The same place in the file of another number.
+    /// The same offset in the file with the index `log`.
     #[must_use]
     pub fn in_log(self, log: usize) -> Self {
         Self {
@@ -40,7 +40,7 @@ impl TextPlace {
         u64::from(self.high) << 32 | u64::from(self.low)
     }
 
-    /// The same place, with the file index raised by the `logs` files before those of its run.
+    /// The same offset, with the file index raised by `logs`, the number of files of the runs before.
     pub(super) fn after(self, logs: usize) -> Self {
         Self {
             log: self.log + logs as u16,

@@ -7,19 +7,19 @@ use crate::types::records::small_number::{SmallNumber, Tokens};
 #[derive(Debug, Clone)]
 pub(super) struct TrialFacts<F> {
     pub(super) text: TextPlace,
-    /// Fingerprint that distinguishes replies; see [`reply_digest`].
+    /// Hash of the reply and refusal ([`hash_reply`]).
     pub(super) reply: [u32; 2],
     pub(super) item: u32,
     pub(super) asked: u32,
     pub(super) ending: u32,
     pub(super) tokens: Tokens,
-    /// In milliseconds.
+    /// Duration of the last attempt, in milliseconds.
     pub(super) latency: SmallNumber,
     pub(super) facts: F,
 }
 
-/// A hash of a reply and a refusal, that tells whether two trials have the same. Zero stands for no reply.
-pub(super) fn reply_digest(reply: Option<&str>, refusal: Option<&str>) -> [u32; 2] {
+/// Hashes a reply and a refusal, to compare them between trials. Zero means no reply.
+pub(super) fn hash_reply(reply: Option<&str>, refusal: Option<&str>) -> [u32; 2] {
     if reply.is_none() && refusal.is_none() {
         return [0; 2];
     }
@@ -29,9 +29,11 @@ pub(super) fn reply_digest(reply: Option<&str>, refusal: Option<&str>) -> [u32; 
         hasher.update(&length.to_le_bytes());
         hasher.update(text.unwrap_or_default().as_bytes());
     }
-    let hash = *hasher.finalize().as_bytes();
-    let part = |at: usize| u32::from_le_bytes([hash[at], hash[at + 1], hash[at + 2], hash[at + 3]]);
-    [part(0).max(1), part(4)]
+    let [a, b, c, d, e, f, g, h, ..] = *hasher.finalize().as_bytes();
+    [
+        u32::from_le_bytes([a, b, c, d]).max(1),
+        u32::from_le_bytes([e, f, g, h]),
+    ]
 }
 
 #[cfg(test)]
@@ -45,7 +47,7 @@ mod tests {
     }
 
     #[test]
-    fn replies_and_refusals_are_told_apart() {
+    fn replies_and_refusals_have_different_hashes() {
         let digests = [
             (None, None),
             (Some(""), None),
@@ -53,7 +55,7 @@ mod tests {
             (Some("a"), Some("b")),
             (Some("ab"), Some("")),
         ]
-        .map(|(reply, refusal)| reply_digest(reply, refusal));
+        .map(|(reply, refusal)| hash_reply(reply, refusal));
         for (place, one) in digests.iter().enumerate() {
             assert!(!digests[place + 1..].contains(one));
         }

@@ -1,4 +1,4 @@
-//! One trial of several: [`TrialRef`].
+//! [`TrialRef`]: one trial in a table.
 
 use super::asked_model::Ending;
 use super::trial_facts::TrialFacts;
@@ -9,7 +9,7 @@ use crate::types::{
     OpenDetail, OptionProbabilities, QuestionId, Record, Step, TrialKey, TrialOutcome, Usage,
 };
 
-/// One of several trials.
+/// A view of one trial in [`Trials`].
 #[derive(Debug)]
 pub struct TrialRef<'t, D: StoredDetail = ChoiceDetail> {
     trials: &'t Trials<D>,
@@ -18,7 +18,7 @@ pub struct TrialRef<'t, D: StoredDetail = ChoiceDetail> {
 
 #[expect(
     clippy::expl_impl_clone_on_copy,
-    reason = "derived, it would ask the same of the detail"
+    reason = "a derived impl would require `D: Clone`"
 )]
 impl<D: StoredDetail> Clone for TrialRef<'_, D> {
     fn clone(&self) -> Self {
@@ -55,11 +55,11 @@ impl<'t, D: StoredDetail> TrialRef<'t, D> {
     }
 
     /// The key; `None` if the keys of the trials were dropped.
-    pub(super) fn key_if_there(self) -> Option<TrialKey> {
+    pub(super) fn key_if_known(self) -> Option<TrialKey> {
         self.trials.keys.get(self.place).copied()
     }
 
-    /// Where the texts of the trial are.
+    /// Location of the texts of the trial.
     #[must_use]
     pub fn text(self) -> TextPlace {
         self.facts().text
@@ -93,7 +93,7 @@ impl<'t, D: StoredDetail> TrialRef<'t, D> {
         &self.item().choices
     }
 
-    /// How many times the same question was asked before.
+    /// How many times the same question was asked before this trial.
     #[must_use]
     pub fn repeat(self) -> u32 {
         self.item().repeat
@@ -182,7 +182,7 @@ impl<'t, D: StoredDetail> TrialRef<'t, D> {
         self.ending().attempts
     }
 
-    /// The attempts that were charged and gave no reply, or one that was asked again with a larger limit.
+    /// The attempts that were charged and gave no reply, or a truncated reply that was replaced by one with a larger token limit.
     #[must_use]
     pub fn lost(self) -> LostAttempts {
         self.ending().lost
@@ -194,7 +194,7 @@ impl<'t, D: StoredDetail> TrialRef<'t, D> {
         self.ending().max_tokens
     }
 
-    /// The trial that counts of two with one key, where `later` was stored later: a failure does not replace a reply.
+    /// Chooses between this trial and one with the same key that was stored later: a failure does not replace a reply.
     #[must_use]
     pub fn or_later(self, later: Self) -> KeptTrial {
         if later.failed() && !self.failed() {
@@ -204,8 +204,8 @@ impl<'t, D: StoredDetail> TrialRef<'t, D> {
         }
     }
 
-    /// Cost of this trial in addition to that of `other`, which has the same key and counts in its place. A reply with the same limit is
-    /// the same reply, read again, and costs nothing.
+    /// Cost of this trial in addition to that of `other`, which has the same key and replaces it. If both have the same token limit and a
+    /// reply, it is one reply that was parsed twice: the cost is zero.
     pub(super) fn paid_besides(self, other: Self) -> LostAttempts {
         let is_asked_again = self.max_tokens() < other.max_tokens();
         let mut paid = LostAttempts::default();
@@ -226,8 +226,8 @@ impl<'t, D: StoredDetail> TrialRef<'t, D> {
 
     /// Digest of the images sent; `None` if no image was sent or the digest is unknown.
     #[must_use]
-    pub fn sent(self) -> Option<Digest> {
-        D::sent_of(&self.facts().facts, &self.trials.tables)
+    pub fn sent_digest(self) -> Option<Digest> {
+        D::sent_digest_of(&self.facts().facts, &self.trials.tables)
     }
 }
 
@@ -273,7 +273,7 @@ impl<'t> TrialRef<'t, ChoiceDetail> {
         self.facts().facts.is_letter
     }
 
-    /// The images that were sent; `None` if there are none.
+    /// The images that were sent; `None` without images.
     #[must_use]
     pub fn images(self) -> Option<&'t SentImages> {
         self.trials.tables.images(self.facts().facts)
@@ -281,7 +281,7 @@ impl<'t> TrialRef<'t, ChoiceDetail> {
 
     /// The frame whose image was shown.
     #[must_use]
-    pub fn shown(self) -> &'t FrameId {
+    pub fn sent_frame(self) -> &'t FrameId {
         self.images()
             .and_then(|images| images.shown_frame.as_ref())
             .unwrap_or(self.frame())
@@ -293,7 +293,7 @@ impl<'t> TrialRef<'t, ChoiceDetail> {
         self.trials.tables.observed(self.facts().facts)
     }
 
-    /// How likely the model held each choice.
+    /// The model's probability of each choice.
     #[must_use]
     pub fn options(self) -> Option<&'t OptionProbabilities> {
         self.trials.tables.options(self.facts().facts)
@@ -301,7 +301,7 @@ impl<'t> TrialRef<'t, ChoiceDetail> {
 }
 
 impl TrialRef<'_, OpenDetail> {
-    /// Whether an answer was asked for, and no mark.
+    /// True if the task was an answer, false if it was a mark.
     pub fn is_answer(self) -> bool {
         self.facts().facts.detail.step == Step::Answer
     }

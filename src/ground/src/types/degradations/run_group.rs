@@ -1,11 +1,11 @@
-//! Runs of a report that show the same images, if other runs show others under the same name: [`RunGroup`].
+//! [`RunGroup`]: runs in a report that use the same images.
 
 use std::fmt;
 use std::sync::Arc;
 
-/// The runs of a report that show the same images in a condition, while other runs of the report show others under its name.
+/// The runs in a report whose images of a condition are equal, if other runs in the report have other images under the same condition.
 ///
-/// A condition of a run alone has none. It is never stored: only a report on several runs sets it.
+/// It is never stored: only a report on several runs sets it.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct RunGroup {
     /// The name of the first of the runs, which the tables show.
@@ -30,15 +30,15 @@ impl RunGroup {
         &self.name
     }
 
-    /// Whether two groups have a run in common; `None` is all runs.
+    /// True if two groups have a run in common; `None` means all runs.
     #[must_use]
-    pub fn meet(one: Option<&Self>, other: Option<&Self>) -> bool {
+    pub fn overlap(one: Option<&Self>, other: Option<&Self>) -> bool {
         one.zip(other)
             .is_none_or(|(one, other)| one.runs.iter().any(|run| other.runs.contains(run)))
     }
 }
 
-/// The name of the group as conditions and variants end with it: ` @RUN`.
+/// Writes the suffix of conditions and variants, ` @RUN`.
 impl fmt::Display for RunGroup {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, " @{}", self.name)
@@ -50,12 +50,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn groups_meet_in_a_run() {
-        let group = |runs: &[usize]| RunGroup::new("a", runs);
-        let (one, two, both) = (group(&[0]), group(&[1]), group(&[0, 1]));
-        assert!(!RunGroup::meet(Some(&one), Some(&two)));
-        assert!(RunGroup::meet(Some(&one), Some(&both)));
-        assert!(RunGroup::meet(None, Some(&two)));
+    fn groups_with_a_common_run_overlap() {
+        let [one, two, both] = [&[0][..], &[1], &[0, 1]].map(|runs| RunGroup::new("a", runs));
+        assert!(!RunGroup::overlap(Some(&one), Some(&two)));
+        assert!(RunGroup::overlap(Some(&one), Some(&both)));
+        assert!(RunGroup::overlap(None, Some(&two)));
         assert_eq!(format!("L3-noise{one}"), "L3-noise @a");
     }
 }

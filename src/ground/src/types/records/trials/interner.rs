@@ -1,19 +1,19 @@
-//! Different values, each with a number: [`Values`].
+//! [`Interner`]: stores equal values once and gives each a number.
 
 use std::hash::{BuildHasher, Hash};
 
 use hashbrown::{DefaultHashBuilder, HashTable};
 
-/// The different values that were met, in the order in which they were met first. A value has its place among them as number.
+/// Distinct values in the order in which they were added. The number of a value is its index.
 #[derive(Debug, Clone)]
-pub(super) struct Values<T> {
+pub(super) struct Interner<T> {
     all: Vec<T>,
     /// The numbers, by the hashes of their values.
     numbers: HashTable<u32>,
     hashes: DefaultHashBuilder,
 }
 
-impl<T> Default for Values<T> {
+impl<T> Default for Interner<T> {
     fn default() -> Self {
         Self {
             all: Vec::new(),
@@ -23,24 +23,24 @@ impl<T> Default for Values<T> {
     }
 }
 
-impl<T: Hash + Eq> Values<T> {
-    /// The number of a value; it is kept if it is new.
-    pub(super) fn number(&mut self, value: T) -> u32 {
+impl<T: Hash + Eq> Interner<T> {
+    /// The number of a value, which is added if it is new.
+    pub(super) fn intern(&mut self, value: T) -> u32 {
         match self.find(&value, |known| *known == value) {
             Some(number) => number,
             None => self.push(value),
         }
     }
 
-    /// The number of the value that `is_it`; a key of it has the same hash.
-    pub(super) fn find(&self, key: &impl Hash, is_it: impl Fn(&T) -> bool) -> Option<u32> {
+    /// The number of the value for which `is_equal` returns true. `key` must have the same hash as that value.
+    pub(super) fn find(&self, key: &impl Hash, is_equal: impl Fn(&T) -> bool) -> Option<u32> {
         let hash = self.hashes.hash_one(key);
         self.numbers
-            .find(hash, |number| is_it(self.get(*number)))
+            .find(hash, |number| is_equal(self.get(*number)))
             .copied()
     }
 
-    /// Keeps a value that is new.
+    /// Adds a value that is known to be new, and returns its number.
     pub(super) fn push(&mut self, value: T) -> u32 {
         let Self {
             all,
@@ -50,14 +50,15 @@ impl<T: Hash + Eq> Values<T> {
         let number = all.len() as u32;
         let hash = hashes.hash_one(&value);
         all.push(value);
-        let rehash = |number: &u32| hashes.hash_one(&all[*number as usize]);
-        numbers.insert_unique(hash, number, rehash);
+        numbers.insert_unique(hash, number, |number| {
+            hashes.hash_one(&all[*number as usize])
+        });
         number
     }
 }
 
-impl<T> Values<T> {
-    /// The value of a number.
+impl<T> Interner<T> {
+    /// The value with a number.
     pub(super) fn get(&self, number: u32) -> &T {
         &self.all[number as usize]
     }
@@ -67,7 +68,7 @@ impl<T> Values<T> {
         &self.all
     }
 
-    /// All values with what each becomes; two may become equal. After this no value is looked up by its content.
+    /// All values, to change them. Two may become equal, so values are no longer found by their content.
     pub(super) fn all_mut(&mut self) -> &mut [T] {
         self.numbers.clear();
         &mut self.all
@@ -84,9 +85,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn equal_values_have_one_number() {
-        let mut values = Values::default();
-        let numbers: Vec<u32> = (0..3000).map(|n| values.number(n % 1000)).collect();
+    fn equal_values_share_a_number() {
+        let mut values = Interner::default();
+        let numbers: Vec<u32> = (0..3000).map(|n| values.intern(n % 1000)).collect();
         assert!(
             numbers
                 .iter()

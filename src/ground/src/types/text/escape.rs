@@ -1,12 +1,12 @@
-//! Text that came from outside, as it may be shown: [`shown`].
+//! Escaping of hidden characters in untrusted text: [`escape_hidden`].
 //!
-//! A name in a data set, a run or a reply of an endpoint may hold characters that move a terminal, turn the direction of a line, or are
-//! not seen at all; and a control character makes an SVG file no XML.
+//! A name in a data set, a run or a reply of an endpoint may contain characters that move the cursor of a terminal, reverse the direction
+//! of a line, or are invisible. Control characters also make an SVG file invalid XML.
 
 use std::borrow::Cow;
 use std::fmt::Write as _;
 
-/// The colours of this program's own text on a terminal: bold, red, green, yellow, and none.
+/// The terminal styles that this program prints: bold, red, green, yellow, and reset.
 const STYLES: [&str; 5] = [
     "\u{1b}[1m",
     "\u{1b}[31m",
@@ -15,8 +15,9 @@ const STYLES: [&str; 5] = [
     "\u{1b}[0m",
 ];
 
-/// Whether a character is not seen as itself: a control but line feed and tab, a line separator, an annotation mark, or one that
-/// Unicode calls ignorable by default (direction marks, invisible letters, tags), but the two selectors of the form of an emoji.
+/// True for a character that is invisible or changes the text around it: control characters except line feed and tab, line separators,
+/// annotation marks, and Unicode's default-ignorable characters (direction marks, invisible letters, tags) except the two variation
+/// selectors of emoji.
 #[must_use]
 pub fn is_hidden(c: char) -> bool {
     matches!(
@@ -28,7 +29,7 @@ pub fn is_hidden(c: char) -> bool {
     )
 }
 
-/// A text on one line, in at most `most` characters: a longer one ends in `…`.
+/// A text on one line, cut to `most` characters; a cut text ends in `…`.
 #[must_use]
 pub fn excerpt(text: &str, most: usize) -> String {
     let line = text.chars().map(|c| if c.is_control() { ' ' } else { c });
@@ -39,58 +40,57 @@ pub fn excerpt(text: &str, most: usize) -> String {
     format!("{head}…")
 }
 
-/// A text with each hidden character as `⟨U+202E⟩`.
+/// Replaces each hidden character by its code, as `⟨U+202E⟩`.
 #[must_use]
-pub fn shown(text: &str) -> Cow<'_, str> {
-    written_out(text, is_hidden)
+pub fn escape_hidden(text: &str) -> Cow<'_, str> {
+    escape_where(text, is_hidden)
 }
 
-/// A text with each character that is to be written out as `⟨U+0009⟩`.
+/// Replaces each character that `is_escaped` accepts by its code, as `⟨U+0009⟩`.
 #[must_use]
-pub fn written_out(text: &str, is_written_out: impl Fn(char) -> bool) -> Cow<'_, str> {
-    let Some(first) = text.find(&is_written_out) else {
+pub fn escape_where(text: &str, is_escaped: impl Fn(char) -> bool) -> Cow<'_, str> {
+    let Some(first) = text.find(&is_escaped) else {
         return Cow::Borrowed(text);
     };
-    let mut shown = String::with_capacity(text.len() + 8);
-    shown.push_str(&text[..first]);
+    let mut escaped = String::with_capacity(text.len() + 8);
+    escaped.push_str(&text[..first]);
     for c in text[first..].chars() {
-        if is_written_out(c) {
-            push_code(&mut shown, c);
+        if is_escaped(c) {
+            push_code(&mut escaped, c);
         } else {
-            shown.push(c);
+            escaped.push(c);
         }
     }
-    Cow::Owned(shown)
+    Cow::Owned(escaped)
 }
 
-/// A text for a terminal as [`shown`], with the colours that this program uses left in it.
+/// Replaces hidden characters as [`escape_hidden`] does, but keeps the terminal styles that this program prints.
 #[must_use]
-pub fn shown_in_colours(text: &str) -> Cow<'_, str> {
+pub fn escape_hidden_except_styles(text: &str) -> Cow<'_, str> {
     if !text.contains(is_hidden) {
         return Cow::Borrowed(text);
     }
-    let mut shown = String::with_capacity(text.len() + 8);
+    let mut escaped = String::with_capacity(text.len() + 8);
     let mut rest = text;
     while let Some(c) = rest.chars().next() {
-        let style = STYLES.iter().find(|style| rest.starts_with(**style));
-        if let Some(style) = style {
-            shown.push_str(style);
+        if let Some(style) = STYLES.iter().find(|style| rest.starts_with(**style)) {
+            escaped.push_str(style);
             rest = &rest[style.len()..];
             continue;
         }
         if is_hidden(c) {
-            push_code(&mut shown, c);
+            push_code(&mut escaped, c);
         } else {
-            shown.push(c);
+            escaped.push(c);
         }
         rest = &rest[c.len_utf8()..];
     }
-    Cow::Owned(shown)
+    Cow::Owned(escaped)
 }
 
-/// Adds the code of a character, as `⟨U+202E⟩`.
-fn push_code(shown: &mut String, c: char) {
-    let _ = write!(shown, "⟨U+{:04X}⟩", u32::from(c));
+/// Appends the code of a character, as `⟨U+202E⟩`.
+fn push_code(text: &mut String, c: char) {
+    let _ = write!(text, "⟨U+{:04X}⟩", u32::from(c));
 }
 
 #[cfg(test)]
@@ -98,7 +98,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn hidden_characters_are_written_out() {
+    fn hidden_characters_become_codes() {
         for (text, expected) in [
             ("plain\ttext\n", "plain\ttext\n"),
             ("a\u{202e}b", "a⟨U+202E⟩b"),
@@ -107,15 +107,15 @@ mod tests {
             ("a\u{3164}\u{34f}\u{e0101}", "a⟨U+3164⟩⟨U+034F⟩⟨U+E0101⟩"),
             ("⚠\u{fe0f} עברית", "⚠\u{fe0f} עברית"),
         ] {
-            assert_eq!(shown(text), expected);
+            assert_eq!(escape_hidden(text), expected);
         }
     }
 
     #[test]
-    fn on_a_terminal_only_colours_stay() {
+    fn own_styles_are_kept() {
         let text = "\u{1b}[1m\u{1b}[32m✓\u{1b}[0m \u{1b}[2J\u{1b}[8mhidden\r";
         let expected = "\u{1b}[1m\u{1b}[32m✓\u{1b}[0m ⟨U+001B⟩[2J⟨U+001B⟩[8mhidden⟨U+000D⟩";
-        assert_eq!(shown_in_colours(text), expected);
-        assert_eq!(shown_in_colours("as it is"), "as it is");
+        assert_eq!(escape_hidden_except_styles(text), expected);
+        assert_eq!(escape_hidden_except_styles("as it is"), "as it is");
     }
 }

@@ -10,7 +10,7 @@ pub(super) struct Names<'a> {
     pub(super) folded: &'a str,
     /// Letters that name a choice, from left to right.
     pub(super) letters: Vec<Name>,
-    /// Texts of choices, from left to right. None lies inside a longer one.
+    /// Texts of choices, from left to right; none is inside a longer one.
     pub(super) texts: Vec<Name>,
 }
 
@@ -18,14 +18,16 @@ impl Names<'_> {
     /// The choice's text that begins at a byte, after optional articles and words such as "it is".
     pub(super) fn text_at(&self, at: usize) -> Option<Name> {
         self.text_from(at)
-            .or_else(|| self.text_from(at + markers::article(&self.folded[at..])))
+            .or_else(|| self.text_from(at + markers::article_length(&self.folded[at..])))
     }
 
     /// The choice's text that begins exactly at a byte.
     pub(super) fn text_from(&self, at: usize) -> Option<Name> {
         let first = self.texts.partition_point(|name| name.start < at);
-        let name = self.texts.get(first).copied();
-        name.filter(|name| name.start == at)
+        self.texts
+            .get(first)
+            .copied()
+            .filter(|name| name.start == at)
     }
 
     /// The choice's text after a letter that labels it: "B. kitchen", "(B) a kitchen", "B: kitchen", "B-kitchen".
@@ -39,67 +41,58 @@ impl Names<'_> {
             return None;
         }
         let name = self.text_at(letter.end + gap.len())?;
-        // On another line it is the letter's text only if it fills the line.
+        // A text on another line belongs to the letter only if it fills that line.
         let line = self.text[name.end..].trim_start_matches(['.', ' ']);
-        let alone = !gap.contains('\n') || line.is_empty() || line.starts_with('\n');
-        (alone && name.state.counts()).then_some(name)
+        let belongs = !gap.contains('\n') || line.is_empty() || line.starts_with('\n');
+        (belongs && name.state.counts()).then_some(name)
     }
 
     /// The choice's text directly before a letter in brackets: "kitchen (B)".
     pub(super) fn text_before(&self, letter: &Name) -> Option<Name> {
         let open = self.text[..letter.start].strip_suffix(['(', '['])?;
-        let end = open.trim_end_matches(' ').len();
-        self.text_to(end)
+        self.text_ending_at(open.trim_end_matches(' ').len())
     }
 
     /// The choice's text that ends exactly at a byte.
-    pub(super) fn text_to(&self, end: usize) -> Option<Name> {
-        let after = self.texts.partition_point(|name| name.start < end);
-        let name = self.texts[..after].last().copied();
-        name.filter(|name| name.end == end)
+    pub(super) fn text_ending_at(&self, end: usize) -> Option<Name> {
+        last_before(&self.texts, end).filter(|name| name.end == end)
     }
 
-    /// Whether a name begins in `start..end`.
+    /// True if a name begins in `start..end`.
     pub(super) fn any(&self, start: usize, end: usize) -> bool {
-        let begins = |names: &[Name]| {
-            let first = names.partition_point(|name| name.start < start);
-            names.get(first).is_some_and(|name| name.start < end)
-        };
-        begins(&self.letters) || begins(&self.texts)
+        self.first_start(start).is_some_and(|first| first < end)
     }
 
     /// The first byte of a name that ends at a byte.
-    pub(super) fn start_of(&self, end: usize) -> Option<usize> {
-        let ending = |names: &[Name]| {
-            let after = names.partition_point(|name| name.start < end);
-            names[..after]
-                .last()
-                .filter(|name| name.end == end)
-                .map(|name| name.start)
-        };
-        ending(&self.texts).or_else(|| ending(&self.letters))
+    pub(super) fn start_of_name_ending_at(&self, end: usize) -> Option<usize> {
+        [&self.texts, &self.letters]
+            .into_iter()
+            .filter_map(|names| last_before(names, end))
+            .find(|name| name.end == end)
+            .map(|name| name.start)
     }
 
-    /// The first byte of the first name that begins at a byte or behind it.
-    pub(super) fn first_from(&self, start: usize) -> Option<usize> {
-        let first = |names: &[Name]| {
-            let first = names.partition_point(|name| name.start < start);
-            names.get(first).map(|name| name.start)
-        };
-        let (letter, text) = (first(&self.letters), first(&self.texts));
-        letter.min(text).or(letter).or(text)
+    /// The first byte of the first name that begins at a byte or after it.
+    pub(super) fn first_start(&self, start: usize) -> Option<usize> {
+        [&self.letters, &self.texts]
+            .into_iter()
+            .filter_map(|names| {
+                let first = names.partition_point(|name| name.start < start);
+                names.get(first).map(|name| name.start)
+            })
+            .min()
     }
 
     /// The first byte of the last name that begins before a byte.
-    pub(super) fn last_before(&self, end: usize) -> Option<usize> {
-        let last = |names: &[Name]| {
-            let after = names.partition_point(|name| name.start < end);
-            names[..after].last().map(|name| name.start)
-        };
-        last(&self.letters).max(last(&self.texts))
+    pub(super) fn last_start(&self, end: usize) -> Option<usize> {
+        [&self.letters, &self.texts]
+            .into_iter()
+            .filter_map(|names| last_before(names, end))
+            .map(|name| name.start)
+            .max()
     }
 
-    /// Letters and texts, in no order.
+    /// Letters, then texts.
     pub(super) fn all(&self) -> impl Iterator<Item = &Name> {
         self.letters.iter().chain(&self.texts)
     }
@@ -110,4 +103,10 @@ impl Names<'_> {
             name.state = state(name);
         }
     }
+}
+
+/// The last of these sorted names that begins before a byte.
+fn last_before(names: &[Name], end: usize) -> Option<Name> {
+    let after = names.partition_point(|name| name.start < end);
+    names[..after].last().copied()
 }

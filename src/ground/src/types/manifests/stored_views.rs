@@ -8,36 +8,36 @@ use serde_json::json;
 use super::manifest::RunManifest;
 use crate::types::View;
 
-/// The entry of a manifest's settings that holds the views of models which are asked without images.
+/// The key in a manifest's settings for the views of models that are asked without images.
 const VIEWS: &str = "views of models";
 
 /// Inputs shown to each model, by its name in tables.
 pub type Views = BTreeMap<String, BTreeSet<View>>;
 
-/// How well the inputs of one model match those of another.
+/// How the inputs of a stored model compare with those of a model in the command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Fit {
-    /// One is shown images alone, and the other one none.
-    Apart,
-    /// Not recorded in the manifest.
+    /// No view in common: one is shown images alone, the other none.
+    Disjoint,
+    /// The manifest does not record the views.
     Unknown,
-    /// One is shown everything that the other one is, and more.
-    Part,
-    /// The same.
-    Whole,
+    /// One is asked with and without images, the other in one of these ways.
+    Overlapping,
+    /// The same views.
+    Equal,
 }
 
 /// The inputs that the models of a stored run were shown, as far as its manifest records them.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StoredViews {
     known: Views,
-    /// Whether a model that is not among these was shown images alone.
-    is_whole: bool,
+    /// True if the views of all models are known: a model that is not in `known` was shown images alone.
+    is_complete: bool,
 }
 
-/// A model as the settings of a manifest hold it.
+/// A model in the settings of an older manifest.
 #[derive(Deserialize)]
-struct Noted {
+struct ManifestModel {
     name: String,
     view: BTreeSet<View>,
 }
@@ -52,39 +52,41 @@ impl StoredViews {
         {
             return Self {
                 known,
-                is_whole: true,
+                is_complete: true,
             };
         }
-        // The models that the command before asked by its file.
-        let models = manifest.settings.get("models").cloned();
-        let models = models
-            .and_then(|models| serde_json::from_value::<Vec<Noted>>(models).ok())
+        // Older manifests contain only the models in the models file of the last command.
+        let known = manifest
+            .settings
+            .get("models")
+            .and_then(|models| serde_json::from_value::<Vec<ManifestModel>>(models.clone()).ok())
             .into_iter()
-            .flatten();
+            .flatten()
+            .map(|model| (model.name, model.view))
+            .collect();
         Self {
-            known: models.map(|model| (model.name, model.view)).collect(),
-            is_whole: false,
+            known,
+            is_complete: false,
         }
     }
 
     /// True if the manifest records the views of all models.
-    pub fn is_noted(&self) -> bool {
-        self.is_whole
+    pub fn is_complete(&self) -> bool {
+        self.is_complete
     }
 
-    /// Compares the stored inputs of a model with those that a model is shown now.
-    pub fn fit(&self, stored: &str, now: &BTreeSet<View>) -> Fit {
+    /// Compares the stored views of a model with those of a model in the command.
+    pub fn compare(&self, stored: &str, now: &BTreeSet<View>) -> Fit {
         match self.views(stored) {
             None => Fit::Unknown,
-            Some(views) if views == *now => Fit::Whole,
-            Some(views) if views.is_disjoint(now) => Fit::Apart,
-            Some(_) => Fit::Part,
+            Some(views) if views == *now => Fit::Equal,
+            Some(views) if views.is_disjoint(now) => Fit::Disjoint,
+            Some(_) => Fit::Overlapping,
         }
     }
 
-    /// Records the views in a manifest under the current names: those of the stored models, each with its new name, and those of the
-    /// command.
-    pub fn note<'a>(
+    /// Writes the views to a manifest: those of the stored models, each under its new name, and those of the command's models.
+    pub fn write_to<'a>(
         &self,
         manifest: &mut RunManifest,
         stored: impl Iterator<Item = (&'a String, String)>,
@@ -112,6 +114,6 @@ impl StoredViews {
         self.known
             .get(name)
             .cloned()
-            .or_else(|| self.is_whole.then(|| BTreeSet::from([View::Image])))
+            .or_else(|| self.is_complete.then(|| BTreeSet::from([View::Image])))
     }
 }

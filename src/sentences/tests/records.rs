@@ -1,4 +1,4 @@
-//! Sentences from made records, through all tests: what is named, counted, and left out.
+//! Sentences about synthetic records: which models and levels they name, count and leave out.
 
 use super::checked;
 use crate::sentences::{Sentence, Tone, sentences};
@@ -71,7 +71,7 @@ pub(super) fn unanswered(frame: String, family: Family, choices: &[&str]) -> Cho
 }
 
 /// All sentences about records.
-fn said(records: &[Record]) -> Vec<Sentence> {
+fn sentences_about(records: &[Record]) -> Vec<Sentence> {
     let trials = records.iter().cloned().collect();
     sentences(&Findings::new(&trials, &FrameTies::default(), [], &[]))
 }
@@ -93,7 +93,7 @@ fn references_are_neither_ranked_nor_mixed() {
         asked("random", FRAMES, &dark),
     ]
     .concat();
-    let alone = said(&all);
+    let alone = sentences_about(&all);
     assert!(of_kind(&alone, "best").is_empty());
     let darkness = of_kind(&alone, "darkness");
     assert!(
@@ -102,9 +102,9 @@ fn references_are_neither_ranked_nor_mixed() {
         "{darkness:?}"
     );
     all.extend(asked("a", FRAMES, &levels));
-    assert!(of_kind(&said(&all), "best").is_empty());
+    assert!(of_kind(&sentences_about(&all), "best").is_empty());
     all.extend(asked("b", FRAMES, &dark));
-    let best = of_kind(&said(&all), "best");
+    let best = of_kind(&sentences_about(&all), "best");
     assert!(
         best[0].starts_with("+ a sees best in the dark (L3–L5). ("),
         "{best:?}"
@@ -112,13 +112,7 @@ fn references_are_neither_ranked_nor_mixed() {
 }
 
 #[test]
-fn what_images_give_over_the_words_alone_is_said_at_l0() {
-    let say = |with: f64, without: f64| {
-        let all = asked("m", FRAMES, &[("blind", without), ("L0", with)]);
-        let images = of_kind(&said(&all), "images");
-        assert_eq!(images.len(), 1, "{images:?}");
-        images[0].clone()
-    };
+fn gain_from_images_is_reported_at_l0() {
     for (with, without, start) in [
         (
             1.0,
@@ -136,42 +130,41 @@ fn what_images_give_over_the_words_alone_is_said_at_l0() {
             "· No gain by images was detected at L0: 50.0 % with them, 50.0 % without. (",
         ),
     ] {
-        let said = say(with, without);
+        let said = images_sentence(with, without);
         assert!(said.starts_with(start), "{said}");
     }
     // Without a model that was asked without images, there is nothing to say.
-    let seen = said(&asked("m", FRAMES, &[("L0", 1.0)]));
+    let seen = sentences_about(&asked("m", FRAMES, &[("L0", 1.0)]));
     assert!(of_kind(&seen, "images").is_empty());
 }
 
+fn images_sentence(with: f64, without: f64) -> String {
+    let all = asked("m", FRAMES, &[("blind", without), ("L0", with)]);
+    let images = of_kind(&sentences_about(&all), "images");
+    assert_eq!(images.len(), 1, "{images:?}");
+    images[0].clone()
+}
+
 #[test]
-fn darkness_names_the_variant_that_shows_it() {
-    let say = |ev: f64, noise: f64| {
-        let all = asked(
-            "m",
-            FRAMES,
-            &[("L0", 1.0), ("L5-ev", ev), ("L5-noise", noise)],
-        );
-        of_kind(&said(&all), "darkness")
-    };
-    let both = say(0.0, 0.0);
+fn darkness_names_the_detecting_variant() {
+    let both = darkness_sentences(0.0, 0.0);
     assert!(
         both.len() == 1
             && both[0].starts_with("− Darkness costs 100.0 points at L5, from 100.0 % at L0. ("),
         "{both:?}"
     );
-    let neither = say(1.0, 1.0);
+    let neither = darkness_sentences(1.0, 1.0);
     assert!(
         neither.len() == 1 && neither[0].starts_with("· No loss by darkness was detected"),
         "{neither:?}"
     );
-    let noise = say(1.0, 0.0);
+    let noise = darkness_sentences(1.0, 0.0);
     assert!(
         noise.len() == 1
             && noise[0].starts_with("− With noise, darkness costs 100.0 points at L5, from"),
         "{noise:?}"
     );
-    let ev = say(0.0, 1.0);
+    let ev = darkness_sentences(0.0, 1.0);
     assert_eq!(ev.len(), 2, "{ev:?}");
     assert!(
         ev[0].starts_with("· With noise, no loss by darkness was detected at any level;"),
@@ -184,7 +177,7 @@ fn darkness_names_the_variant_that_shows_it() {
         "{ev:?}"
     );
     let one = of_kind(
-        &said(&asked("m", FRAMES, &[("L0", 1.0), ("L5-ev", 0.0)])),
+        &sentences_about(&asked("m", FRAMES, &[("L0", 1.0), ("L5-ev", 0.0)])),
         "darkness",
     );
     assert!(
@@ -193,8 +186,17 @@ fn darkness_names_the_variant_that_shows_it() {
     );
 }
 
+fn darkness_sentences(ev: f64, noise: f64) -> Vec<String> {
+    let all = asked(
+        "m",
+        FRAMES,
+        &[("L0", 1.0), ("L5-ev", ev), ("L5-noise", noise)],
+    );
+    of_kind(&sentences_about(&all), "darkness")
+}
+
 #[test]
-fn too_few_clusters_are_no_verdict_set_by_set() {
+fn topics_without_a_verdict_are_listed() {
     let levels = [
         ("blind", 0.0),
         ("L0", 1.0),
@@ -210,8 +212,8 @@ fn too_few_clusters_are_no_verdict_set_by_set() {
         ("L5-noise", 0.0),
         ("L3-noise+lift", 1.0),
     ];
-    // Seven frames: 5 · 2 / 2⁷ is above 0.05, and one level alone is not.
-    let few = said(&asked("m", 7, &levels));
+    // With seven frames the smallest corrected p over five levels, 5 · 2 / 2⁷, is above 0.05; for a single level it is below.
+    let few = sentences_about(&asked("m", 7, &levels));
     for kind in ["darkness", "noise", "below blind"] {
         assert!(of_kind(&few, kind).is_empty(), "{kind}");
     }
@@ -227,19 +229,19 @@ fn too_few_clusters_are_no_verdict_set_by_set() {
         "{lift:?}"
     );
     let models = [asked("a", 4, &levels), asked("b", 4, &levels)].concat();
-    let fewer = said(&models);
+    let fewer = sentences_about(&models);
     assert!(of_kind(&fewer, "best").is_empty());
     let without = of_kind(&fewer, "no verdict");
     assert!(
         without[0].starts_with("· With 4 frames no verdict on darkness, noise, lift, dark images against no images and the best model is possible,"),
         "{without:?}"
     );
-    let enough = said(&asked("m", 8, &levels));
+    let enough = sentences_about(&asked("m", 8, &levels));
     assert_eq!(of_kind(&enough, "darkness").len(), 1);
     assert!(of_kind(&enough, "no verdict").is_empty());
 }
 
-/// Sentences that do not say who is apart.
+/// The sentences except those about models that are left out.
 fn about_others(said: &[Sentence]) -> Vec<String> {
     said.iter()
         .filter(|sentence| !["apart", "left out"].contains(&sentence.kind))
@@ -248,7 +250,7 @@ fn about_others(said: &[Sentence]) -> Vec<String> {
 }
 
 #[test]
-fn a_model_that_lacks_levels_changes_nothing_about_others() {
+fn models_without_some_levels_are_left_out() {
     let all_levels = [
         ("L0", 1.0),
         ("L1-noise", 1.0),
@@ -258,17 +260,17 @@ fn a_model_that_lacks_levels_changes_nothing_about_others() {
         ("L5-noise", 0.0),
     ];
     let one = asked("a", FRAMES, &all_levels);
-    let alone = said(&one);
+    let alone = sentences_about(&one);
     assert!(of_kind(&alone, "left out").is_empty() && of_kind(&alone, "apart").is_empty());
-    // What a reference was asked is no level of the models.
+    // The levels of a reference do not count as levels of the models.
     let with_random = [
         one.clone(),
         asked("random", FRAMES, &[("L0", 1.0), ("L1-ev", 1.0)]),
     ]
     .concat();
-    assert!(of_kind(&said(&with_random), "left out").is_empty());
+    assert!(of_kind(&sentences_about(&with_random), "left out").is_empty());
     let both = [one, asked("b", FRAMES, &[("L0", 1.0), ("L3-noise", 0.5)])].concat();
-    let both = said(&both);
+    let both = sentences_about(&both);
     assert_eq!(
         of_kind(&both, "left out"),
         [
@@ -293,7 +295,7 @@ fn models_without_a_common_level_stand_apart() {
         asked("b", FRAMES, &[("L0", 1.0), ("L3-noise", 1.0)]),
     ]
     .concat();
-    let seen = said(&records);
+    let seen = sentences_about(&records);
     let darkness = of_kind(&seen, "darkness");
     assert!(darkness[0].contains(" (a: 0.0 "), "{darkness:?}");
     let left_out = of_kind(&seen, "left out");
@@ -305,18 +307,18 @@ fn models_without_a_common_level_stand_apart() {
 }
 
 #[test]
-fn a_model_with_part_of_the_questions_changes_nothing_about_others() {
+fn models_with_fewer_questions_are_left_out() {
     let levels = [("L0", 1.0), ("L3-noise", 0.5), ("L5-noise", 0.0)];
     let two = [asked("a", FRAMES, &levels), asked("b", FRAMES, &levels)].concat();
     let part = asked("part", 3, &levels);
-    let with_part = said(&[two.clone(), part].concat());
-    let but_best = |said: &[Sentence]| -> Vec<String> {
-        about_others(said)
+    let with_part = sentences_about(&[two.clone(), part].concat());
+    let [with, without] = [&with_part, &sentences_about(&two)].map(|sentences| {
+        about_others(sentences)
             .into_iter()
-            .filter(|said| !said.contains("the highest mean accuracy"))
-            .collect()
-    };
-    assert_eq!(but_best(&with_part), but_best(&said(&two)));
+            .filter(|line| !line.contains("the highest mean accuracy"))
+            .collect::<Vec<_>>()
+    });
+    assert_eq!(with, without);
     let best = of_kind(&with_part, "best");
     assert!(
         best[0].contains("n = 24 in 12 frames; without part,"),
@@ -337,7 +339,7 @@ fn a_model_with_part_of_the_questions_changes_nothing_about_others() {
 }
 
 #[test]
-fn people_are_in_no_mean_even_if_they_answered_everything() {
+fn people_are_in_no_mean() {
     let levels = [("L0", 1.0), ("L3-noise", 0.5), ("L5-noise", 0.0)];
     let bright = [("L0", 1.0), ("L3-noise", 1.0), ("L5-noise", 1.0)];
     let two = [asked("a", FRAMES, &levels), asked("b", FRAMES, &levels)].concat();
@@ -351,16 +353,11 @@ fn people_are_in_no_mean_even_if_they_answered_everything() {
         (record.detail.strict, record.detail.lenient) = (reading, reading);
         record.detail.outcome = TrialOutcome::Unparsed;
     }
-    let mut listing = ModelListing::default();
-    listing.add_people("human".to_owned());
-    let say = |records: &[Record]| {
-        let trials = records.iter().cloned().collect();
-        let findings = Findings::with_listing(&trials, &FrameTies::default(), [], &[], &listing);
-        assert!(findings.common.is_none());
-        sentences(&findings)
-    };
-    let with_people = say(&[two.clone(), people.clone()].concat());
-    assert_eq!(about_others(&with_people), about_others(&say(&two)));
+    let with_people = sentences_with_people(&[two.clone(), people.clone()].concat());
+    assert_eq!(
+        about_others(&with_people),
+        about_others(&sentences_with_people(&two))
+    );
     let apart = of_kind(&with_people, "apart");
     assert!(
         apart[0].starts_with("· With noise, human: 100.0 % at L0, 87.5 % at L5; the mean of 2 models: 100.0 % and 0.0 % on the same questions. (people; L0 ["),
@@ -370,13 +367,22 @@ fn people_are_in_no_mean_even_if_they_answered_everything() {
         apart[0].contains(", n = 24, 3 “I cannot tell”; in no mean)"),
         "{apart:?}"
     );
-    // Alone they are what the report is about.
-    assert!(of_kind(&say(&people), "darkness")[0].contains("human: "));
+    // Without models the report is about the people.
+    assert!(of_kind(&sentences_with_people(&people), "darkness")[0].contains("human: "));
+}
+
+fn sentences_with_people(records: &[Record]) -> Vec<Sentence> {
+    let mut listing = ModelListing::default();
+    listing.add_people("human".to_owned());
+    let trials = records.iter().cloned().collect();
+    let findings = Findings::with_listing(&trials, &FrameTies::default(), [], &[], &listing);
+    assert!(findings.common.is_none());
+    sentences(&findings)
 }
 
 #[test]
-fn the_best_model_has_its_light_and_each_level_once() {
-    // Two runs show other images: the clean ones and the dark ones stand apart.
+fn best_model_has_its_variant_and_levels() {
+    // Two runs with different images, so that their conditions are separate.
     let mut all = Vec::new();
     for (run, name) in ["d0", "d1"].into_iter().enumerate() {
         for (model, dark) in [("a", 1.0), ("b", 0.0)] {
@@ -401,7 +407,7 @@ fn the_best_model_has_its_light_and_each_level_once() {
 }
 
 #[test]
-fn families_are_compared_two_by_two() {
+fn two_families_are_compared() {
     let mut all = asked("m", FRAMES, &[("L0", 1.0), ("L5-noise", 0.0)]);
     for record in &mut all {
         let is_dark = record
@@ -416,7 +422,7 @@ fn families_are_compared_two_by_two() {
             (record.detail.strict, record.detail.lenient) = (right, right);
         }
     }
-    let families = of_kind(&said(&all), "families");
+    let families = of_kind(&sentences_about(&all), "families");
     assert!(
         families[0].starts_with("· Darkness costs more in object colour (−100.0 points at L5) than in room type (0.0). ("),
         "{families:?}"
@@ -447,12 +453,12 @@ fn scripted(model: &str, conditions: &[(&str, usize)]) -> Vec<Record> {
     records
 }
 
-/// Makes every fifth reply of a condition a sentence that only the lenient parsing reads.
+/// Makes every fifth reply of a condition readable by the lenient parsing only.
 fn wordy(records: &mut [Record], condition: &str) {
-    let name = |record: &Record| record.condition.as_ref().map(ToString::to_string);
+    let condition: Condition = condition.parse().unwrap();
     let own = records
         .iter_mut()
-        .filter(|record| name(record).as_deref() == Some(condition));
+        .filter(|record| record.condition.as_ref() == Some(&condition));
     for record in own.step_by(5) {
         record.detail.strict = Some(AnswerReading {
             chosen: None,
@@ -471,7 +477,7 @@ const SEEING: [(&str, usize); 7] = [
     ("L5-noise+lift", 100),
 ];
 
-/// The signed sentences about darkness, noise, enhancers and words alone.
+/// The sentences with a sign, except the one about the gain from images.
 fn signed(said: &[Sentence]) -> Vec<String> {
     said.iter()
         .filter(|sentence| {
@@ -482,10 +488,10 @@ fn signed(said: &[Sentence]) -> Vec<String> {
 }
 
 #[test]
-fn replies_in_another_format_are_no_blindness() {
+fn format_changes_are_not_losses() {
     let mut one = scripted("m", &SEEING);
     wordy(&mut one, "L5-noise");
-    let seen = said(&one);
+    let seen = sentences_about(&one);
     assert_eq!(signed(&seen), Vec::<String>::new());
     let format = of_kind(&seen, "format");
     assert!(
@@ -495,7 +501,7 @@ fn replies_in_another_format_are_no_blindness() {
         "{format:?}"
     );
     assert!(of_kind(&seen, "darkness").is_empty(), "{seen:?}");
-    // The enhanced images of that level are read as before: that is no help, either.
+    // Replies to the enhanced images of that level keep the format, which is not a gain either.
     assert!(
         format.iter().any(|said| said.starts_with(
             "· With lift at L5, 20.0 % more replies keep to the answer format; no gain of accuracy was detected"
@@ -508,14 +514,14 @@ fn replies_in_another_format_are_no_blindness() {
         .flat_map(|model| scripted(model, &SEEING))
         .collect();
     wordy(&mut several, "L5-noise");
-    let seen = said(&several);
+    let seen = sentences_about(&several);
     assert_eq!(signed(&seen), Vec::<String>::new());
     assert!(of_kind(&seen, "format")[0].contains("(mean of these 3 models: 80.0 % keep to it"));
     let mut lost = SEEING;
     lost[5].1 = 50;
     let mut blind = scripted("m", &lost);
     wordy(&mut blind, "L5-noise");
-    let darkness = of_kind(&said(&blind), "darkness");
+    let darkness = of_kind(&sentences_about(&blind), "darkness");
     assert!(
         darkness[0].starts_with("− With noise, darkness costs "),
         "{darkness:?}"
@@ -523,10 +529,10 @@ fn replies_in_another_format_are_no_blindness() {
 }
 
 #[test]
-fn an_enhancer_that_only_spoils_the_format_does_not_harm() {
+fn format_changes_by_enhancers_are_not_harm() {
     let mut records = scripted("m", &SEEING);
     wordy(&mut records, "L5-noise+lift");
-    let seen = said(&records);
+    let seen = sentences_about(&records);
     assert!(of_kind(&seen, "enhancer").is_empty(), "{seen:?}");
     let format = of_kind(&seen, "format");
     assert!(
@@ -538,11 +544,11 @@ fn an_enhancer_that_only_spoils_the_format_does_not_harm() {
 }
 
 #[test]
-fn a_model_that_only_spoils_the_format_is_not_beaten() {
+fn format_changes_do_not_decide_the_best_model() {
     let mut records = [scripted("a", &SEEING), scripted("b", &SEEING)].concat();
     let split = records.len() / 2;
     wordy(&mut records[split..], "L5-noise");
-    let best = of_kind(&said(&records), "best");
+    let best = of_kind(&sentences_about(&records), "best");
     assert!(
         best[0].starts_with("· a has the highest mean accuracy"),
         "{best:?}"
@@ -554,37 +560,37 @@ fn a_model_that_only_spoils_the_format_is_not_beaten() {
 }
 
 #[test]
-fn the_best_in_the_dark_is_the_best_at_dark_levels() {
-    let conditions = |percents: [usize; 6]| {
-        let names = [
-            "L0", "L1-noise", "L2-noise", "L3-noise", "L4-noise", "L5-noise",
-        ];
-        let mut all = [("", 0); 6];
-        for (place, pair) in all.iter_mut().zip(names.into_iter().zip(percents)) {
-            *place = pair;
-        }
-        all
-    };
-    let bright = scripted("bright", &conditions([99, 97, 97, 45, 35, 35]));
-    let steady = scripted("steady", &conditions([62, 58, 59, 61, 50, 51]));
+fn best_model_is_chosen_at_dark_levels() {
+    let bright = scripted("bright", &at_noise_levels([99, 97, 97, 45, 35, 35]));
+    let steady = scripted("steady", &at_noise_levels([62, 58, 59, 61, 50, 51]));
     let two = [bright.clone(), steady.clone()].concat();
-    let best = of_kind(&said(&two), "best");
+    let best = of_kind(&sentences_about(&two), "best");
     assert!(
         best[0].starts_with("· bright is better to L2, steady from L3. (steady over L3–L5: "),
         "{best:?}"
     );
     // A third model that is worse everywhere changes nothing.
-    let third = scripted("third", &conditions([40, 40, 40, 34, 30, 28]));
-    let best = of_kind(&said(&[two, third].concat()), "best");
+    let third = scripted("third", &at_noise_levels([40, 40, 40, 34, 30, 28]));
+    let best = of_kind(&sentences_about(&[two, third].concat()), "best");
     assert!(
         best[0].starts_with("· bright is better to L2, steady from L3. ("),
         "{best:?}"
     );
     // Without a change of order the best at L3 to L5 is named, not the best of all levels.
-    let even = scripted("even", &conditions([62, 62, 62, 30, 25, 25]));
-    let best = of_kind(&said(&[steady, even].concat()), "best");
+    let even = scripted("even", &at_noise_levels([62, 62, 62, 30, 25, 25]));
+    let best = of_kind(&sentences_about(&[steady, even].concat()), "best");
     assert!(
         best[0].starts_with("+ steady sees best in the dark (L3–L5). ("),
         "{best:?}"
     );
+}
+
+/// L0 to L5 with noise, each with a percentage of right replies.
+fn at_noise_levels(percents: [usize; 6]) -> Vec<(&'static str, usize)> {
+    [
+        "L0", "L1-noise", "L2-noise", "L3-noise", "L4-noise", "L5-noise",
+    ]
+    .into_iter()
+    .zip(percents)
+    .collect()
 }
