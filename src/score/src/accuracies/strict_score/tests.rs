@@ -131,12 +131,12 @@ fn a_group_without_all_replies_is_incomplete_and_not_scored() {
 fn chance_is_the_mean_product_of_one_over_the_choices() {
     let made = records("m", "L0", |_| Some(true));
     // Eleven groups of two questions, one of two groups of one question, and the other question has no group.
-    let group = |item: usize| match item {
+    let questions_in_groups = questions(&made, |item| match item {
         22 => Some("alone".to_owned()),
         23 => None,
         _ => Some(by_frame(item)),
-    };
-    let score = score(&made, &questions(&made, group));
+    });
+    let score = score(&made, &questions_in_groups);
     let chance = score.chance[0].share.unwrap();
     assert!((chance.value - (11.0 / 9.0 + 1.0 / 3.0) / 12.0).abs() < 1e-15);
     assert_eq!((score.groups, score.single), (12, 1));
