@@ -272,31 +272,41 @@ impl SideLookup<'_, '_> {
         level: AxisLevel,
         reading: &ReadingName,
     ) -> Option<(usize, usize)> {
-        let variant = |kind: Option<Kind>, reading: Option<&ReadingName>| Variant {
-            kind,
-            reading: reading.cloned(),
+        let noisy = Variant {
+            kind: Some(Kind::Sensor),
+            reading: Some(reading.clone()),
             pair: None,
             group: self.group.cloned(),
         };
-        let noisy = variant(Some(Kind::Sensor), Some(reading));
-        let subject_index = |level, variant: &Variant, enhancer| {
-            let subject = ModelInCondition::with_images(self.model, level, variant, enhancer);
-            self.grid.find_up_to_group(&subject)
-        };
-        let unenhanced = subject_index(level, &noisy, None);
+        let unenhanced = self.subject_index(level, &noisy, None)?;
         Some(match claim {
-            NoiseHypothesis::NoiseCompounds(_) => (
-                subject_index(level, &variant(Kind::Sensor.base(), None), None)?,
-                unenhanced?,
-            ),
+            NoiseHypothesis::NoiseCompounds(_) => {
+                let base = Variant {
+                    kind: Kind::Sensor.base(),
+                    reading: None,
+                    ..noisy
+                };
+                (self.subject_index(level, &base, None)?, unenhanced)
+            }
             NoiseHypothesis::DarknessCosts => {
-                (unenhanced?, subject_index(AxisLevel::L0, &noisy, None)?)
+                let clean = self.subject_index(AxisLevel::L0, &noisy, None)?;
+                (unenhanced, clean)
             }
             NoiseHypothesis::EnhancerHarms(name) | NoiseHypothesis::EnhancerHelps(name) => {
-                (subject_index(level, &noisy, Some(name))?, unenhanced?)
+                (self.subject_index(level, &noisy, Some(name))?, unenhanced)
             }
-            NoiseHypothesis::BelowBlind(..) => (unenhanced?, self.blind()?),
+            NoiseHypothesis::BelowBlind(..) => (unenhanced, self.blind()?),
         })
+    }
+
+    fn subject_index(
+        &self,
+        level: AxisLevel,
+        variant: &Variant,
+        enhancer: Option<&EnhancerName>,
+    ) -> Option<usize> {
+        let subject = ModelInCondition::with_images(self.model, level, variant, enhancer);
+        self.grid.find_up_to_group(&subject)
     }
 
     /// Index of the same model without images, or else of the only model without images.
@@ -423,13 +433,15 @@ fn effect(grid: &Grid<'_>, pairs: &[(usize, usize)], kept: &[usize]) -> Option<T
     let mut sum_of_squares = 0;
     for &index in kept {
         let item = &grid.items[index];
-        let is_right = |subject: usize| {
-            let reading = grid.result(subject, index).reading(ReadingMode::Strict);
-            i64::from(reading.is_some_and(|chosen| item.is_right(chosen)))
-        };
         let net: i64 = pairs
             .iter()
-            .map(|(first, second)| is_right(*first) - is_right(*second))
+            .map(|(first, second)| {
+                let [first, second] = [first, second].map(|subject| {
+                    let reading = grid.result(*subject, index).reading(ReadingMode::Strict);
+                    i64::from(reading.is_some_and(|chosen| item.is_right(chosen)))
+                });
+                first - second
+            })
             .sum();
         let cluster = &mut clusters[item.cluster as usize];
         cluster.net += net;
@@ -484,14 +496,14 @@ fn support(effect: &TestedEffect, expects_gain: bool) -> Support {
 
 /// Summarizes a claim over the profiles. A profile that was not asked has no effect, so the claim then cannot hold under all.
 fn robustness(effects: &[EffectInReading]) -> Robustness {
-    let count = |support: Support| {
+    let [holding, opposite] = [Support::Holds, Support::Opposite].map(|support| {
         effects
             .iter()
             .filter_map(|effect| effect.effect)
             .filter(|effect| effect.support == support)
             .count()
-    };
-    match (count(Support::Holds), count(Support::Opposite)) {
+    });
+    match (holding, opposite) {
         (0, 0) => Robustness::Open,
         (0, _) => Robustness::None,
         (holding, 0) if holding == effects.len() => Robustness::All,

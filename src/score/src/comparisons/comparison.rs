@@ -5,10 +5,11 @@ mod real_synthetic;
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::claim::{Claim, ParsedFinding};
+use super::holm_of;
 use super::paired::PairedComparison;
 use crate::choice::ReadingMode;
 use crate::grid::Grid;
-use crate::significance::{Significance, holm, least_p};
+use crate::significance::{Significance, least_p};
 use crate::subject::{ModelInCondition, models_under_test};
 use darkqa_ground::types::{AxisLevel, Family, PairDark, Variant, View};
 use rayon::prelude::*;
@@ -119,12 +120,12 @@ impl Comparison {
     /// Statement that sentences may make.
     #[must_use]
     pub fn claim(&self) -> Claim {
-        let parsed = |tested: &TestedComparison| ParsedFinding {
+        let [strict, lenient] = [&self.strict, &self.lenient].map(|tested| ParsedFinding {
             gain: tested.paired.difference.value,
             verdict: tested.significance,
             p_report: tested.p_report,
-        };
-        Claim::new(parsed(&self.strict), parsed(&self.lenient))
+        });
+        Claim::new(strict, lenient)
     }
 
     /// Comparison in a parsing.
@@ -169,11 +170,10 @@ type Job<'a> = (ComparisonKind, Option<&'a Family>, usize, usize);
 fn uncorrected(grid: &Grid<'_>, jobs: Vec<Job<'_>>) -> Vec<Comparison> {
     jobs.into_par_iter()
         .filter_map(|(kind, family, first, second)| {
-            let paired = |mode| PairedComparison::new(grid, first, second, family, mode);
-            let strict = paired(ReadingMode::Strict)?;
+            let strict = PairedComparison::new(grid, first, second, family, ReadingMode::Strict)?;
             let differs = grid.parsings_differ(first) || grid.parsings_differ(second);
             let lenient = if differs {
-                paired(ReadingMode::Lenient)?
+                PairedComparison::new(grid, first, second, family, ReadingMode::Lenient)?
             } else {
                 strict.clone()
             };
@@ -228,13 +228,10 @@ fn corrected(mut all: Vec<Comparison>) -> Vec<Comparison> {
         sets.entry(set).or_default().push(index);
     }
     for set in sets.into_values() {
-        let values = |of: fn(&Comparison) -> f64| -> Vec<f64> {
-            let values = set.iter().map(|index| of(&all[*index]));
-            holm(&values.collect::<Vec<_>>())
-        };
-        let strict = values(|found| found.strict.paired.p);
-        let lenient = values(|found| found.lenient.paired.p);
-        let least = values(|found| least_p(found.strict.paired.clusters));
+        let own = set.iter().map(|index| &all[*index]);
+        let strict = holm_of(own.clone().map(|found| found.strict.paired.p));
+        let lenient = holm_of(own.clone().map(|found| found.lenient.paired.p));
+        let least = holm_of(own.map(|found| least_p(found.strict.paired.clusters)));
         for (position, index) in set.into_iter().enumerate() {
             let comparison = &mut all[index];
             let is_too_small = comparison.is_too_small();
@@ -364,18 +361,11 @@ fn is_other_light(one: &ModelInCondition, other: &ModelInCondition) -> bool {
 
 /// Indices of the same model without images; if it was never asked without images, of all models without images.
 fn blind(grid: &Grid<'_>, subject: &ModelInCondition) -> Vec<usize> {
-    let all = || {
-        grid.subjects
-            .iter()
-            .enumerate()
-            .filter(|(_, other)| other.view == Some(View::Blind))
-    };
-    let same_model: Vec<usize> = all()
-        .filter(|(_, other)| other.model == subject.model)
-        .map(|(index, _)| index)
-        .collect();
+    let (same_model, others): (Vec<usize>, Vec<usize>) = (0..grid.subjects.len())
+        .filter(|index| grid.subjects[*index].view == Some(View::Blind))
+        .partition(|index| grid.subjects[*index].model == subject.model);
     if same_model.is_empty() {
-        all().map(|(index, _)| index).collect()
+        others
     } else {
         same_model
     }
