@@ -1,5 +1,6 @@
 //! Relation between the fidelity of images and right answers: [`FidelityFindings`].
 
+use crate::photographs::dot;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use crate::choice::ReadingMode;
@@ -254,16 +255,14 @@ fn rank_correlation(rows: &[ConditionFidelity], index: usize) -> Option<f64> {
     if fidelity.len() < 3 {
         return None;
     }
-    let (a, b) = (ranks(&fidelity), ranks(&accuracy));
     let middle = f64::midpoint(fidelity.len() as f64, 1.0);
-    let product = |a: &[f64], b: &[f64]| -> f64 {
-        a.iter()
-            .zip(b)
-            .map(|(a, b)| (a - middle) * (b - middle))
-            .sum()
-    };
-    let scale = (product(&a, &a) * product(&b, &b)).sqrt();
-    (scale > 0.0).then(|| product(&a, &b) / scale)
+    let [a, b] = [fidelity, accuracy].map(|values| {
+        let mut ranks = ranks(&values);
+        ranks.iter_mut().for_each(|rank| *rank -= middle);
+        ranks
+    });
+    let scale = (dot(&a, &a) * dot(&b, &b)).sqrt();
+    (scale > 0.0).then(|| dot(&a, &b) / scale)
 }
 
 /// Ranks from 1; equal numbers share the mean of their ranks.

@@ -9,6 +9,7 @@
 //! low-light images; 1.00 and 0.86 for a real and a synthetic pair of LOL-v2. An image at 4 EV that is shifted by 2 % of its shorter
 //! side has at least 0.67, by 4 % at least 0.25.
 
+use crate::photographs::dot;
 use darkqa_ground::types::Rgb;
 
 /// Minimum correlation of images of the same scene (chosen, see above).
@@ -38,8 +39,7 @@ impl SceneMatch {
     pub fn new(normal: &Rgb, low: &Rgb, drop_ev: f64) -> Self {
         let [normal, low] = [normal, low].map(BlockMeans::new);
         let (clean, noisy) = (normal.structure(), low.structure());
-        let sum = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        let (squares, others) = (sum(&clean, &clean), sum(&noisy, &noisy));
+        let (squares, others) = (dot(&clean, &clean), dot(&noisy, &noisy));
         let dropped = libm::exp2(-drop_ev / 2.2);
         let signal = dropped * (squares / clean.len().max(1) as f64).sqrt();
         let reach = signal / libm::hypot(signal, low.noise);
@@ -47,7 +47,7 @@ impl SceneMatch {
         Self {
             correlation: is_clear.then(|| {
                 if others > 0.0 {
-                    sum(&clean, &noisy) / (squares * others).sqrt()
+                    dot(&clean, &noisy) / (squares * others).sqrt()
                 } else {
                     0.0
                 }
@@ -94,10 +94,6 @@ impl BlockMeans {
     /// Subtracts from each mean that of the surrounding blocks, then the overall mean. Blocks at the edges are repeated beyond the image.
     fn structure(&self) -> Vec<f64> {
         let [height, width] = self.size;
-        let surrounding = |index: usize, size: usize| {
-            (index..=index + 2 * SURROUNDING_RADIUS)
-                .map(move |other| other.saturating_sub(SURROUNDING_RADIUS).min(size - 1))
-        };
         let mut structure: Vec<f64> = (0..height)
             .flat_map(|row| (0..width).map(move |column| (row, column)))
             .map(|(row, column)| {
@@ -117,6 +113,12 @@ impl BlockMeans {
         }
         structure
     }
+}
+
+/// Indices around an index, inside 0..`size`; the ends are repeated.
+fn surrounding(index: usize, size: usize) -> impl Iterator<Item = usize> {
+    (index..=index + 2 * SURROUNDING_RADIUS)
+        .map(move |other| other.saturating_sub(SURROUNDING_RADIUS).min(size - 1))
 }
 
 /// Mean green codes of two halves of a block with the same center: of every eight rows, the outer four and the inner four. Their difference
@@ -205,11 +207,12 @@ mod tests {
     fn images_without_structure_are_not_judged() {
         let [height, width] = SIZE;
         let wall = Rgb::new(height, width, vec![120; height * width * 3]).unwrap();
-        let flat = |image: &Rgb| {
-            let codes = image.samples().iter().map(|code| 118 + code / 64);
-            Rgb::new(height, width, codes.collect()).unwrap()
-        };
-        let faint = flat(&scene(5));
+        let codes = scene(5)
+            .samples()
+            .iter()
+            .map(|code| 118 + code / 64)
+            .collect();
+        let faint = Rgb::new(height, width, codes).unwrap();
         for (normal, low) in [
             (&wall, low(&wall, 9.0)),
             (&wall, low(&scene(1), 9.0)),
