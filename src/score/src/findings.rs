@@ -107,10 +107,10 @@ impl<'a> Findings<'a> {
         let clusters = Clusters::new(trials.questions(), ties);
         let questions: Vec<OfferedChoices> = questions.into_iter().collect();
         let observer = ObserverSummary::new(trials, &clusters);
-        let is_model = |model: &str| !is_control(model);
-        let is_shown = |model: &str| is_model(model) && !is_observer(model);
         let without_observer = observer.is_hidden().then(|| {
-            let grid = Grid::for_models(trials, &clusters, listing, is_shown);
+            let grid = Grid::for_models(trials, &clusters, listing, |model| {
+                !is_control(model) && !is_observer(model)
+            });
             Box::new(Self::build(
                 grid,
                 &clusters,
@@ -119,7 +119,7 @@ impl<'a> Findings<'a> {
                 measured,
             ))
         });
-        let grid = Grid::for_models(trials, &clusters, listing, is_model);
+        let grid = Grid::for_models(trials, &clusters, listing, |model| !is_control(model));
         Self {
             without_observer,
             ..Self::build(grid, &clusters, &questions, observer, measured)
