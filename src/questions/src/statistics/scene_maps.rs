@@ -262,8 +262,9 @@ impl<'a> SceneMaps<'a> {
             self.size,
             scaled_length(height, rule.void_per_height),
         );
-        let count = |pixels: &[bool]| pixels.iter().filter(|void| **void).count() as u64;
-        (all, count(&void), count(&void[height / 2 * width..]))
+        let [wide, lower] = [&void[..], &void[height / 2 * width..]]
+            .map(|pixels| pixels.iter().filter(|void| **void).count() as u64);
+        (all, wide, lower)
     }
 }
 
