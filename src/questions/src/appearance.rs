@@ -172,14 +172,10 @@ mod tests {
 
     #[test]
     fn light_is_measured_in_ev_below_white() {
-        let ev = |code: u8| {
-            let codes = [[code; 3]; 5];
-            mean_light(&codes).log2()
-        };
-        assert!(ev(255).abs() < 1e-6);
-        // Code 188 is half of the light of white.
-        assert!((ev(188) + 1.0).abs() < 0.01, "{}", ev(188));
-        assert!(ev(0).is_finite());
+        let [white, half, black] = [255, 188, 0].map(|code: u8| mean_light(&[[code; 3]; 5]).log2());
+        assert!(white.abs() < 1e-6);
+        assert!((half + 1.0).abs() < 0.01, "{half}");
+        assert!(black.is_finite());
     }
 
     #[test]
@@ -195,15 +191,12 @@ mod tests {
 
     #[test]
     fn a_large_picture_has_the_edges_of_the_small_one() {
-        let bars = |x: usize, width: usize| {
-            if (x / width).is_multiple_of(2) {
-                40
-            } else {
-                200
-            }
-        };
-        let small = edges(&image(480, 640, |_, x| bars(x, 16)));
-        let large = edges(&image(960, 1280, |_, x| bars(x, 32)));
+        let [small, large] = [1, 2].map(|scale| {
+            let bars = image(480 * scale, 640 * scale, |_, x| {
+                [40, 200][x / (16 * scale) % 2]
+            });
+            edges(&bars)
+        });
         assert!(
             (small - large).abs() < 1e-9 && small > 0.1,
             "{small} {large}"

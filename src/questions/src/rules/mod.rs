@@ -81,15 +81,15 @@ impl Rules {
     /// # Errors
     /// [`Error::Data`] if the text is not TOML of this schema, or names a class, room or token that it does not define.
     pub fn parse(text: &str) -> Result<Self> {
-        let wrong = |problem: String| Error::data("rules", problem);
         let book: RuleBook = toml::from_str(text).map_err(|e| {
             let TomlFault { line, problem } = TomlFault::new(text, &e);
-            wrong(format!("line {line}: {problem}"))
+            Error::data("rules", format!("line {line}: {problem}"))
         })?;
-        book.check().map_err(wrong)?;
-        let digest = digest_values(&book).map_err(|e| wrong(e.to_string()))?;
+        book.check()
+            .map_err(|problem| Error::data("rules", problem))?;
+        let digest = digest_values(&book).map_err(|e| Error::data("rules", e))?;
         let measure_digest =
-            digest_values(&(&book.measure, &book.coarse)).map_err(|e| wrong(e.to_string()))?;
+            digest_values(&(&book.measure, &book.coarse)).map_err(|e| Error::data("rules", e))?;
         Ok(Self {
             book,
             digest,
