@@ -89,9 +89,11 @@ fn edges(image: &Rgb) -> f64 {
     let mut steep = 0_usize;
     for y in 0..height {
         for x in 0..width {
-            let side = |right| at(y, x, 0, right) + 2.0 * at(y, x, 1, right) + at(y, x, 2, right);
-            let row = |down| at(y, x, down, 0) + 2.0 * at(y, x, down, 1) + at(y, x, down, 2);
-            let (across, along) = (side(2) - side(0), row(2) - row(0));
+            let [left, right] =
+                [0, 2].map(|dx| at(y, x, 0, dx) + 2.0 * at(y, x, 1, dx) + at(y, x, 2, dx));
+            let [above, below] =
+                [0, 2].map(|dy| at(y, x, dy, 0) + 2.0 * at(y, x, dy, 1) + at(y, x, dy, 2));
+            let (across, along) = (right - left, below - above);
             steep +=
                 usize::from((across * across + along * along).sqrt() / 8.0 >= MIN_EDGE_GRADIENT);
         }

@@ -55,9 +55,9 @@ pub(super) fn balance(
     }
     if mode != BalanceMode::None {
         for (_, list) in groups(&asked, &dropped, binary_key) {
-            let (yes, no): (Vec<usize>, Vec<usize>) = list
+            let (yes, no) = list
                 .into_iter()
-                .partition(|i| asked[*i].question.choices.truth() == Some(0));
+                .partition::<Vec<_>, _>(|i| asked[*i].question.choices.truth() == Some(0));
             let max = yes.len().min(no.len()) + 1;
             dropped.extend(yes.into_iter().skip(max));
             dropped.extend(no.into_iter().skip(max));
@@ -218,9 +218,12 @@ mod tests {
     }
 
     fn chairs_and_beds(family: &Family) -> Vec<GeneratedQuestion> {
-        let chairs = (0..9).map(|i| asked(i, family.clone(), "chair", usize::from(i >= 7)));
-        let beds = (9..12).map(|i| asked(i, family.clone(), "bed", 1));
-        chairs.chain(beds).collect()
+        (0..12)
+            .map(|i| {
+                let thing = if i < 9 { "chair" } else { "bed" };
+                asked(i, family.clone(), thing, usize::from(i >= 7))
+            })
+            .collect()
     }
 
     #[test]

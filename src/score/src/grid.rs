@@ -340,8 +340,9 @@ impl<'a> Grid<'a> {
     /// Groups that are scored separately: all families together (`None`), then each family.
     #[must_use]
     pub fn groups(&self) -> Vec<Option<&'a Family>> {
-        let families = self.families().into_iter().map(Some);
-        std::iter::once(None).chain(families).collect()
+        std::iter::once(None)
+            .chain(self.families().into_iter().map(Some))
+            .collect()
     }
 }
 

@@ -203,8 +203,8 @@ mod tests {
             (&[], &[], &[]),
         ] {
             let models = models.iter().copied();
-            let [expected, pooled] =
-                [expected, pooled].map(|names| BTreeSet::from_iter(names.iter().copied()));
+            let [expected, pooled]: [BTreeSet<&str>; 2] =
+                [expected, pooled].map(|names| names.iter().copied().collect());
             assert_eq!(models_under_test(models.clone()), expected);
             assert_eq!(pooled_models(models), pooled);
         }

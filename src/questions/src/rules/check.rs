@@ -100,13 +100,14 @@ impl RuleBook {
                 ));
             }
         }
-        let mut named = self
+        let unknown = self
             .words
             .plural
             .iter()
             .chain(&self.words.an)
-            .chain(self.words.spelled.values());
-        match named.find(|word| !known.contains(word.as_str())) {
+            .chain(self.words.spelled.values())
+            .find(|word| !known.contains(word.as_str()));
+        match unknown {
             Some(word) => Err(format!("[words] has {word:?}, which no class has")),
             None => Ok(()),
         }

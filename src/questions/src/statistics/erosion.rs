@@ -87,8 +87,11 @@ fn run_length<T: PartialEq>(values: &[T]) -> Option<usize> {
             .iter()
             .take_while(|lanes| count_different(lanes) == 0)
             .count();
-    let rest = values[whole..].iter();
-    Some(whole + rest.take_while(|value| *value == first).count())
+    let rest = values[whole..]
+        .iter()
+        .take_while(|value| *value == first)
+        .count();
+    Some(whole + rest)
 }
 
 #[cfg(test)]

@@ -61,8 +61,9 @@ fn count_rim(
     let last = (right - left > 1).then(|| right - 1);
     let ends = std::iter::once(left)
         .chain(last)
-        .filter(|x| (from..to).contains(x) && above[*x] == mask && below[*x] == mask);
-    u64::from(count) + ends.count() as u64
+        .filter(|x| (from..to).contains(x) && above[*x] == mask && below[*x] == mask)
+        .count();
+    u64::from(count) + ends as u64
 }
 
 /// Shapes of all masks of a frame.

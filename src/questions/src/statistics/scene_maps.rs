@@ -116,8 +116,7 @@ impl<'a> SceneMaps<'a> {
         let LabelSource::SemanticMap(ids) = &self.source else {
             return;
         };
-        let label = |id| self.label(id).wrapping_add(1);
-        self.masks = components(values(ids), self.size, label);
+        self.masks = components(values(ids), self.size, |id| self.label(id).wrapping_add(1));
         self.numbers = (1..=self.masks.iter().copied().max().unwrap_or(0)).collect();
     }
 

@@ -201,10 +201,11 @@ fn chance_cells(questions: &[OfferedChoices]) -> Vec<AccuracyCell> {
     std::iter::once(None)
         .chain(families.into_iter().map(Some))
         .flat_map(|family| {
-            let of_family = questions
-                .iter()
-                .filter(|question| family.is_none_or(|family| question.family == *family));
-            let accuracy = chance(of_family);
+            let accuracy = chance(
+                questions
+                    .iter()
+                    .filter(|question| family.is_none_or(|family| question.family == *family)),
+            );
             ReadingMode::ALL.map(|mode| AccuracyCell {
                 subject: ModelInCondition {
                     model: CHANCE.to_owned(),

@@ -203,12 +203,15 @@ fn ratio_of_sums(draws: &Resamples, terms: &[(u32, f64, f64)]) -> Estimate {
 
 /// Area under the ROC curve of confidence for right against wrong replies.
 fn auroc(clusters: usize, replies: &[ConfidentReply]) -> Option<Auc> {
-    let ranked = replies.iter().map(|reply| RankedReply {
-        cluster: reply.cluster,
-        number: reply.confidence,
-        right: reply.right,
-    });
+    let mut ranked: Vec<RankedReply> = replies
+        .iter()
+        .map(|reply| RankedReply {
+            cluster: reply.cluster,
+            number: reply.confidence,
+            right: reply.right,
+        })
+        .collect();
     let mut pairs = PairCounts::new(clusters);
-    pairs.add(&mut ranked.collect::<Vec<_>>());
+    pairs.add(&mut ranked);
     pairs.auc()
 }

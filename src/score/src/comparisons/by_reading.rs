@@ -404,7 +404,7 @@ fn shared_items(
         .flatten()
         .flat_map(|(first, second)| [*first, *second])
         .collect();
-    let (kept, dropped): (Vec<usize>, Vec<usize>) = grid
+    let (kept, dropped) = grid
         .items
         .iter()
         .enumerate()
@@ -415,7 +415,7 @@ fn shared_items(
                 .iter()
                 .any(|subject| grid.result(*subject, *item).is_asked())
         })
-        .partition(|item| {
+        .partition::<Vec<_>, _>(|item| {
             subjects
                 .iter()
                 .all(|subject| grid.result(*subject, *item).is_reply())

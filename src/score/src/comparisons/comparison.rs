@@ -202,18 +202,22 @@ pub(crate) fn lights_between(grid: &Grid<'_>, names: &[String]) -> Vec<Compariso
         .collect();
     let mut pairs = Vec::new();
     for (position, (index, subject)) in named.iter().enumerate() {
-        let others = named[position + 1..]
-            .iter()
-            .filter(|(_, other)| other.model != subject.model && is_other_light(subject, other));
-        pairs.extend(others.map(|(other, _)| (*index, *other)));
+        pairs.extend(
+            named[position + 1..]
+                .iter()
+                .filter(|(_, other)| other.model != subject.model && is_other_light(subject, other))
+                .map(|(other, _)| (*index, *other)),
+        );
     }
-    let families = grid.groups();
-    let jobs = families.iter().flat_map(|family| {
-        pairs
-            .iter()
-            .map(|(first, second)| (ComparisonKind::Light, *family, *first, *second))
-    });
-    corrected(uncorrected(grid, jobs.collect()))
+    let mut jobs = Vec::new();
+    for family in grid.groups() {
+        jobs.extend(
+            pairs
+                .iter()
+                .map(|(first, second)| (ComparisonKind::Light, family, *first, *second)),
+        );
+    }
+    corrected(uncorrected(grid, jobs))
 }
 
 /// Fills in the significance of the comparisons, after Holm's correction within each set.
@@ -361,9 +365,9 @@ fn is_other_light(one: &ModelInCondition, other: &ModelInCondition) -> bool {
 
 /// Indices of the same model without images; if it was never asked without images, of all models without images.
 fn blind(grid: &Grid<'_>, subject: &ModelInCondition) -> Vec<usize> {
-    let (same_model, others): (Vec<usize>, Vec<usize>) = (0..grid.subjects.len())
+    let (same_model, others) = (0..grid.subjects.len())
         .filter(|index| grid.subjects[*index].view == Some(View::Blind))
-        .partition(|index| grid.subjects[*index].model == subject.model);
+        .partition::<Vec<_>, _>(|index| grid.subjects[*index].model == subject.model);
     if same_model.is_empty() {
         others
     } else {

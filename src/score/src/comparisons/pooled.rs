@@ -37,11 +37,11 @@ fn models<'g>(grid: &'g Grid<'_>, view: View) -> Vec<&'g str> {
     let asked = grid
         .subjects
         .iter()
-        .filter(|subject| subject.view == Some(view));
-    let models = grid
-        .listing
-        .without_people(asked.map(|subject| &*subject.model));
-    pooled_models(models).into_iter().collect()
+        .filter(|subject| subject.view == Some(view))
+        .map(|subject| &*subject.model);
+    pooled_models(grid.listing.without_people(asked))
+        .into_iter()
+        .collect()
 }
 
 /// A kind, variant and enhancer; Holm's correction is applied to each family of such a set.

@@ -258,7 +258,9 @@ fn rank_correlation(rows: &[ConditionFidelity], index: usize) -> Option<f64> {
     let middle = f64::midpoint(fidelity.len() as f64, 1.0);
     let [a, b] = [fidelity, accuracy].map(|values| {
         let mut ranks = ranks(&values);
-        ranks.iter_mut().for_each(|rank| *rank -= middle);
+        for rank in &mut ranks {
+            *rank -= middle;
+        }
         ranks
     });
     let scale = (dot(&a, &a) * dot(&b, &b)).sqrt();
@@ -273,8 +275,9 @@ fn ranks(numbers: &[f64]) -> Vec<f64> {
             let below = numbers.iter().filter(|other| *other < number).count();
             let equal = numbers
                 .iter()
-                .filter(|other| other.total_cmp(number).is_eq());
-            below as f64 + f64::midpoint(equal.count() as f64, 1.0)
+                .filter(|other| other.total_cmp(number).is_eq())
+                .count();
+            below as f64 + f64::midpoint(equal as f64, 1.0)
         })
         .collect()
 }

@@ -167,13 +167,16 @@ mod tests {
     use super::*;
 
     fn pair(facts: &[(Option<f64>, f64, f64)]) -> PairDarkness {
-        let facts = facts.iter().map(|(stated, mean, median)| PairFacts {
-            stated: *stated,
-            mean: Some(*mean),
-            median: Some(*median),
-            synthesis: Some(*mean),
-        });
-        PairDarkness::new(&PhotoName::numbered(0), &facts.collect::<Vec<_>>()).unwrap()
+        let facts: Vec<PairFacts> = facts
+            .iter()
+            .map(|(stated, mean, median)| PairFacts {
+                stated: *stated,
+                mean: Some(*mean),
+                median: Some(*median),
+                synthesis: Some(*mean),
+            })
+            .collect();
+        PairDarkness::new(&PhotoName::numbered(0), &facts).unwrap()
     }
 
     #[test]

@@ -180,13 +180,11 @@ fn groups_that_share_a_frame_are_one_cluster() {
 
 #[test]
 fn a_question_asked_again_must_be_right_again() {
-    let first = records("m", "L0", |_| Some(true));
-    let again = records("m", "L0", |item| Some(item != 10));
-    let again = again.into_iter().map(|mut record| {
+    let mut again = records("m", "L0", |item| Some(item != 10));
+    for record in &mut again {
         record.detail.repeat = 1;
-        record
-    });
-    let made: Vec<Record> = first.into_iter().chain(again).collect();
+    }
+    let made = [records("m", "L0", |_| Some(true)), again].concat();
     let all = questions(&made, |item| Some(by_frame(item)));
     let twice = score(&made, &all);
     assert_eq!(strict(&twice, "L0").right, 11);

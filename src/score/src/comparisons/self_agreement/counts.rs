@@ -80,8 +80,10 @@ impl<'g> BankCounts<'g> {
                 .whole
                 .values()
                 .filter_map(|counts| {
-                    let answers = counts.answers.values().map(|answers| answers[side]);
-                    entropy(answers, counts.choices)
+                    entropy(
+                        counts.answers.values().map(|answers| answers[side]),
+                        counts.choices,
+                    )
                 })
                 .collect();
             (!entropies.is_empty()).then(|| entropies.iter().sum::<f64>() / entropies.len() as f64)

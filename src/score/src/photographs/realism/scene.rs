@@ -127,9 +127,9 @@ fn halves(image: &Rgb, [top, left]: [usize; 2], side: usize) -> [f64; 2] {
     let mut sums = [0_u64; 2];
     for row in 0..side {
         let line = &image.samples()[((top + row) * image.width() + left) * 3..][..3 * side];
-        let greens = line.iter().skip(1).step_by(3);
+        let greens = line.iter().skip(1).step_by(3).copied();
         let half = usize::from((2..6).contains(&(row % SIDE_STEP)));
-        sums[half] += greens.map(|code| u64::from(*code)).sum::<u64>();
+        sums[half] += greens.map(u64::from).sum::<u64>();
     }
     sums.map(|sum| sum as f64 / (side * side / 2) as f64)
 }
@@ -169,11 +169,15 @@ mod tests {
     /// The image 4.4 EV darker, under uniform noise of ± `noise` codes.
     fn low(image: &Rgb, noise: f64) -> Rgb {
         let mut dice = Dice(77);
-        let codes = image.samples().iter().map(|code| {
-            let noisy = f64::from(*code) / 4.0 + noise * (2.0 * dice.next() - 1.0);
-            noisy.clamp(0.0, 255.0) as u8
-        });
-        Rgb::new(image.height(), image.width(), codes.collect()).unwrap()
+        let codes = image
+            .samples()
+            .iter()
+            .map(|code| {
+                let noisy = f64::from(*code) / 4.0 + noise * (2.0 * dice.next() - 1.0);
+                noisy.clamp(0.0, 255.0) as u8
+            })
+            .collect();
+        Rgb::new(image.height(), image.width(), codes).unwrap()
     }
 
     #[test]

@@ -199,8 +199,13 @@ fn nothing_without_a_truth_is_scored_as_an_accuracy() {
     let trials = records.iter().cloned().collect();
     let findings = Findings::new(&trials, &FrameTies::default(), [], &[]);
     assert!(findings.grid.items.is_empty());
-    let mut cells = findings.summary.cells.iter();
-    assert!(cells.all(|cell| cell.accuracy.is_none() && cell.right == 0));
+    assert!(
+        findings
+            .summary
+            .cells
+            .iter()
+            .all(|cell| cell.accuracy.is_none() && cell.right == 0)
+    );
     found(&records, |found| {
         assert!(!found.grid.items.is_empty());
         assert_eq!(
