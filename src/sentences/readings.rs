@@ -2,12 +2,12 @@
 
 use super::sentence::{Numbers, Sentence, Tone};
 use darkqa_score::cluster::ClusterUnit;
-use darkqa_score::comparisons::{FindingByReading, NoiseHypothesis, Robustness};
+use darkqa_score::comparisons::{FindingByProfile, NoiseHypothesis, Robustness};
 
 /// How many findings about noise hold under which readings; `None` with one reading. The levels of one finding count once.
-pub(super) fn readings(found: &[FindingByReading], unit: ClusterUnit) -> Option<Sentence> {
+pub(super) fn readings(found: &[FindingByProfile], unit: ClusterUnit) -> Option<Sentence> {
     let readings = found.first()?.effects.len();
-    let whole: Vec<&FindingByReading> = found
+    let whole: Vec<&FindingByProfile> = found
         .iter()
         .filter(|one| !matches!(one.claim, NoiseHypothesis::NoiseCompounds(Some(_))))
         .collect();

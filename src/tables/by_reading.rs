@@ -9,24 +9,24 @@ use crate::types::degradations::Kind;
 use crate::types::{AxisLevel, ReadingName};
 use darkqa_score::accuracies::Curve;
 use darkqa_score::comparisons::{
-    EffectInReading, FindingByReading, NoiseHypothesis, Robustness, Support, TestedEffect,
+    EffectInProfile, FindingByProfile, NoiseHypothesis, Robustness, Support, TestedEffect,
 };
 use darkqa_score::findings::Findings;
 
 /// One row a claim and reading in the file; one row a claim, with a column a reading, for people. Empty with one reading.
 pub(super) fn by_reading(findings: &Findings<'_>) -> Vec<Table> {
-    let found = &findings.by_reading;
+    let found = &findings.by_profile;
     let Some(first) = found.first() else {
         return Vec::new();
     };
-    let readings: Vec<&ReadingName> = first.effects.iter().map(|effect| &effect.reading).collect();
+    let readings: Vec<&ReadingName> = first.effects.iter().map(|effect| &effect.profile).collect();
     vec![file(found), shown(findings, &readings)]
 }
 
 /// A row of the file.
-type FileRow<'f> = (&'f FindingByReading, &'f EffectInReading);
+type FileRow<'f> = (&'f FindingByProfile, &'f EffectInProfile);
 
-fn file(found: &[FindingByReading]) -> Table {
+fn file(found: &[FindingByProfile]) -> Table {
     let rows = found
         .iter()
         .flat_map(|finding| finding.effects.iter().map(move |effect| (finding, effect)));
@@ -45,7 +45,7 @@ fn file(found: &[FindingByReading]) -> Table {
         })
         .column(Text, "csv blind", |(finding, _)| finding.blind.clone())
         .column(Text, "csv reading", |(_, effect)| {
-            effect.reading.to_string()
+            effect.profile.to_string()
         })
         .column(Number, "csv effect low high n", |row| {
             tested(row).map(|effect| effect.difference)
@@ -62,12 +62,12 @@ fn file(found: &[FindingByReading]) -> Table {
 
 /// A row of the table that is shown: a finding, or the thresholds of a model.
 enum Row<'f> {
-    Finding(&'f FindingByReading),
-    Thresholds(&'f FindingByReading, Vec<&'f Curve>),
+    Finding(&'f FindingByProfile),
+    Thresholds(&'f FindingByProfile, Vec<&'f Curve>),
 }
 
 impl Row<'_> {
-    fn finding(&self) -> &FindingByReading {
+    fn finding(&self) -> &FindingByProfile {
         match self {
             Self::Finding(finding) | Self::Thresholds(finding, _) => finding,
         }
@@ -76,9 +76,9 @@ impl Row<'_> {
 
 fn shown(findings: &Findings<'_>, readings: &[&ReadingName]) -> Table {
     let mut rows = Vec::new();
-    let found = &findings.by_reading;
+    let found = &findings.by_profile;
     let is_same =
-        |a: &FindingByReading, b: &FindingByReading| (&a.model, &a.group) == (&b.model, &b.group);
+        |a: &FindingByProfile, b: &FindingByProfile| (&a.model, &a.group) == (&b.model, &b.group);
     for block in found.chunk_by(is_same) {
         rows.extend(block.iter().map(Row::Finding));
         rows.push(Row::Thresholds(&block[0], thresholds(findings, &block[0])));
@@ -130,7 +130,7 @@ fn shown(findings: &Findings<'_>, readings: &[&ReadingName]) -> Table {
 }
 
 /// The raw curves of a finding's model with noise, all families together.
-fn thresholds<'f>(findings: &'f Findings<'_>, finding: &FindingByReading) -> Vec<&'f Curve> {
+fn thresholds<'f>(findings: &'f Findings<'_>, finding: &FindingByProfile) -> Vec<&'f Curve> {
     findings
         .curves
         .iter()
@@ -164,7 +164,7 @@ fn threshold(curves: &[&Curve], reading: &ReadingName) -> String {
     )
 }
 
-fn subject(finding: &FindingByReading) -> String {
+fn subject(finding: &FindingByProfile) -> String {
     let group = finding.group.as_ref().map(ToString::to_string);
     finding.model.clone() + &group.unwrap_or_default()
 }
@@ -181,7 +181,7 @@ fn effect(effect: Option<&TestedEffect>) -> String {
     )
 }
 
-fn items(finding: &FindingByReading) -> usize {
+fn items(finding: &FindingByProfile) -> usize {
     finding
         .effects
         .iter()
@@ -203,7 +203,7 @@ fn span(levels: &[AxisLevel], whole: usize) -> String {
 }
 
 /// A claim in words, with its levels.
-fn title(finding: &FindingByReading) -> String {
+fn title(finding: &FindingByProfile) -> String {
     let levels = &finding.levels;
     match &finding.claim {
         NoiseHypothesis::NoiseCompounds(None) => {
@@ -238,7 +238,7 @@ fn title(finding: &FindingByReading) -> String {
 }
 
 /// A claim as the beginning of a sentence.
-fn clause(finding: &FindingByReading) -> String {
+fn clause(finding: &FindingByProfile) -> String {
     let levels = &finding.levels;
     match &finding.claim {
         NoiseHypothesis::NoiseCompounds(None) => "Noise compounds the drop".to_owned(),
@@ -256,12 +256,12 @@ fn clause(finding: &FindingByReading) -> String {
 }
 
 /// The findings by reading, as `Noise compounds the drop under paper, eld; open under physical (−1.2 to 5.0 points).`
-fn sentence(finding: &FindingByReading) -> String {
+fn sentence(finding: &FindingByProfile) -> String {
     let of = |support: Support| -> Vec<String> {
         finding
             .effects
             .iter()
-            .filter_map(|one| Some((&one.reading, one.effect.as_ref()?)))
+            .filter_map(|one| Some((&one.profile, one.effect.as_ref()?)))
             .filter(|(_, effect)| effect.support == support)
             .map(|(reading, effect)| match support {
                 Support::Holds => reading.to_string(),
@@ -278,7 +278,7 @@ fn sentence(finding: &FindingByReading) -> String {
         .effects
         .iter()
         .filter(|one| one.effect.is_none())
-        .map(|one| one.reading.to_string())
+        .map(|one| one.profile.to_string())
         .collect();
     let parts = [
         ("holds under", of(Support::Holds)),
@@ -295,7 +295,7 @@ fn sentence(finding: &FindingByReading) -> String {
 }
 
 /// A sentence for each finding that some reading decides, and the omissions.
-fn notes(found: &[FindingByReading]) -> Vec<String> {
+fn notes(found: &[FindingByProfile]) -> Vec<String> {
     let models: BTreeSet<String> = found.iter().map(subject).collect();
     let mut notes: Vec<String> = found
         .iter()
@@ -327,7 +327,7 @@ mod tests {
     use crate::types::Severity;
     use darkqa_score::estimate::Estimate;
 
-    fn effect_of(reading: &str, low: f64, high: f64, support: Support) -> EffectInReading {
+    fn effect_of(reading: &str, low: f64, high: f64, support: Support) -> EffectInProfile {
         let value = f64::midpoint(low, high);
         let difference = Estimate {
             value,
@@ -336,8 +336,8 @@ mod tests {
             n: 9,
         };
         let (p, holm) = (0.01, 0.02);
-        EffectInReading {
-            reading: ReadingName::new(reading).unwrap(),
+        EffectInProfile {
+            profile: ReadingName::new(reading).unwrap(),
             effect: Some(TestedEffect {
                 difference,
                 support,
@@ -350,7 +350,7 @@ mod tests {
     #[test]
     fn a_sentence_names_each_reading_and_its_interval_where_it_does_not_hold() {
         let level = AxisLevel::new(Kind::Sensor, Severity::L5);
-        let mut finding = FindingByReading {
+        let mut finding = FindingByProfile {
             model: "m".to_owned(),
             group: None,
             claim: NoiseHypothesis::NoiseCompounds(None),

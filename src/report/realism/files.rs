@@ -56,7 +56,7 @@ pub(crate) fn pairs(pairs: &[&PairComparison]) -> Result<Vec<u8>> {
             row.noise.map(|noise| noise.clean_psnr)
         })
         .column(Text, "csv reading", |row| {
-            let reading = row.noise.map(|noise| noise.method.reading.to_string());
+            let reading = row.noise.map(|noise| noise.method.profile.to_string());
             reading.unwrap_or_default()
         })
         .column(Text, "csv camera", |row| {
@@ -93,7 +93,7 @@ pub(crate) fn by_code(residuals: &PooledResiduals) -> Result<Vec<u8>> {
         .column(Number, "csv noise_mean", |(.., (.., noise))| noise[0])
         .column(Number, "csv noise_std", |(.., (.., noise))| noise[1])
         .column(Text, "csv reading", |(method, ..)| {
-            method.reading.to_string()
+            method.profile.to_string()
         })
         .column(Text, "csv camera", |(method, ..)| method.camera.word())
         .build();
@@ -157,8 +157,8 @@ pub(crate) fn crops<'a>(pairs: impl Iterator<Item = (&'a PairComparison, &'a [Rg
     let noise = pairs.iter().take(1).flat_map(|(pair, _)| &pair.noise);
     // A column is 36 letters wide.
     let noise = noise.map(|noise| match noise.method.camera {
-        CameraOrigin::Given => format!("with noise, {}", noise.method.reading),
-        _ => format!("with noise, {}, fitted", noise.method.reading),
+        CameraOrigin::Given => format!("with noise, {}", noise.method.profile),
+        _ => format!("with noise, {}, fitted", noise.method.profile),
     });
     let columns = ["real", "exposure drop alone"].map(str::to_owned);
     let columns: Vec<String> = columns.into_iter().chain(noise).collect();

@@ -5,7 +5,7 @@ use crate::text::csv;
 use crate::text::table::ColumnKind::{Number, Text};
 use crate::text::table::TableBuilder;
 use crate::text::terminal;
-use darkqa_score::photographs::realism::gain::{FitOutcome, PairFit, PooledGain, ReadingFit};
+use darkqa_score::photographs::realism::gain::{FitOutcome, PairFit, PooledGain, ProfileFit};
 use darkqa_score::photographs::realism::mean::Mean;
 
 /// The definition of a picture's gain, printed beside every gain.
@@ -13,13 +13,13 @@ pub(crate) const AS_SAVED: &str =
     "as saved; a smaller K than the sensor's means that noise was averaged away";
 
 /// The table of the gains over pairs, a row for each noise profile.
-pub(super) fn table(fits: &[ReadingFit]) -> String {
+pub(super) fn table(fits: &[ProfileFit]) -> String {
     let range = |gains: &PooledGain| {
         let [low, high] = gains.range.map(number);
         format!("{low} to {high}")
     };
     let table = TableBuilder::new("fits", fits)
-        .column(Text, "terminal", |fit| fit.reading.to_string())
+        .column(Text, "terminal", |fit| fit.profile.to_string())
         .column(Text, "terminal K", |fit| {
             fit.pooled.as_ref().map(|gains| mean(fit, gains, 1.0))
         })
@@ -42,7 +42,7 @@ pub(super) fn table(fits: &[ReadingFit]) -> String {
 }
 
 /// The geometric mean of a multiple of K with its interval; the values alone where there are too few for it.
-fn mean(fit: &ReadingFit, gains: &PooledGain, factor: f64) -> String {
+fn mean(fit: &ProfileFit, gains: &PooledGain, factor: f64) -> String {
     let number = |gain: f64| number(factor * gain);
     if let Some(Mean {
         value,
@@ -62,12 +62,12 @@ fn mean(fit: &ReadingFit, gains: &PooledGain, factor: f64) -> String {
 }
 
 /// A line of text for each pair and each noise profile.
-pub(super) fn by_pair(fits: &[ReadingFit]) -> impl Iterator<Item = String> {
+pub(super) fn by_pair(fits: &[ProfileFit]) -> impl Iterator<Item = String> {
     fits.iter()
         .flat_map(|fit| fit.pairs.iter().map(|pair| line(fit, pair)))
 }
 
-fn line(fit: &ReadingFit, PairFit { pair, fit: found }: &PairFit) -> String {
+fn line(fit: &ProfileFit, PairFit { pair, fit: found }: &PairFit) -> String {
     let gain = found.gain.map(|gain| match fit.ratio {
         Some(ratio) => format!(
             "rK {} (K {} at r {})",
@@ -81,7 +81,7 @@ fn line(fit: &ReadingFit, PairFit { pair, fit: found }: &PairFit) -> String {
     let outcome = found.outcome != FitOutcome::Fitted;
     let outcome = outcome.then(|| found.outcome.to_string());
     let parts: Vec<String> = [gain, misfit, outcome].into_iter().flatten().collect();
-    format!("{pair}, {}: {}", fit.reading, parts.join(", "))
+    format!("{pair}, {}: {}", fit.profile, parts.join(", "))
 }
 
 /// A number with three significant digits.
@@ -96,13 +96,13 @@ fn number(value: f64) -> String {
 }
 
 /// CSV file with a row for each pair and each noise profile.
-pub(crate) fn csv(fits: &[ReadingFit]) -> Result<Vec<u8>> {
+pub(crate) fn csv(fits: &[ProfileFit]) -> Result<Vec<u8>> {
     let rows = fits
         .iter()
         .flat_map(|fit| fit.pairs.iter().map(move |pair| (fit, pair)));
     let table = TableBuilder::new("fits", rows)
         .column(Text, "csv pair", |(_, pair)| pair.pair.clone())
-        .column(Text, "csv reading", |(fit, _)| fit.reading.to_string())
+        .column(Text, "csv reading", |(fit, _)| fit.profile.to_string())
         .column(Number, "csv gain", |(_, pair)| pair.fit.gain)
         .column(Number, "csv ratio", |(fit, _)| fit.ratio)
         .column(Number, "csv ratio_gain", |(fit, pair)| {

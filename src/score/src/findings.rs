@@ -10,8 +10,8 @@ use super::calibration::{Calibration, calibrations};
 use super::choice::ReadingMode;
 use super::cluster::{ClusterUnit, Clusters, FrameTies};
 use super::comparisons::{
-    Agreement, BestInTheDark, Comparison, ComparisonKind, FindingByReading, ModelsLeftOut,
-    PooledFinding, PooledKind, agreements, best_in_the_dark, by_reading, comparisons,
+    Agreement, BestInTheDark, Comparison, ComparisonKind, FindingByProfile, ModelsLeftOut,
+    PooledFinding, PooledKind, agreements, best_in_the_dark, by_profile, comparisons,
     light_agreements, lights_between, models_left_out, pool, pooled,
 };
 use super::grid::Grid;
@@ -31,7 +31,7 @@ pub struct Findings<'a> {
     pub grid: Grid<'a>,
     /// Unit that is treated as independent.
     pub unit: ClusterUnit,
-    /// Accuracies by subject, family and reading.
+    /// Accuracies by subject, family and parsing.
     pub summary: AccuracySummary,
     /// Counts of replies, unreadable replies and failures of each subject.
     pub health: Vec<Health>,
@@ -42,7 +42,7 @@ pub struct Findings<'a> {
     /// Models that the pooled findings leave out because they answered fewer items than others.
     pub left_out: Vec<ModelsLeftOut>,
     /// Test results of each claim about noise under every noise profile; empty with a single profile.
-    pub by_reading: Vec<FindingByReading>,
+    pub by_profile: Vec<FindingByProfile>,
     /// Ranking of the models by mean accuracy in the dark; `None` with fewer than two models.
     pub best: Option<BestInTheDark>,
     /// The same ranking in the lenient parsing.
@@ -189,7 +189,7 @@ impl<'a> Findings<'a> {
             pooled,
             averaged,
             left_out: models_left_out(&grid),
-            by_reading: by_reading(&grid),
+            by_profile: by_profile(&grid),
             best: best_in_the_dark(&grid, ReadingMode::Strict),
             lenient_best: best_in_the_dark(&grid, ReadingMode::Lenient),
             comparisons: comparisons(&grid),

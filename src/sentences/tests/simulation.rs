@@ -229,7 +229,7 @@ fn simulate(design: &Design, runs: usize, seed: u64) -> Counts {
         };
         counts.own += usize::from(whole().any(|finding| finding.strict.verdict.is_shown()));
         let is_decided = findings
-            .by_reading
+            .by_profile
             .iter()
             .any(|finding| finding.robustness.word() != "open");
         counts.decided += usize::from(is_decided);

@@ -46,7 +46,7 @@ fn yes_needs_one_good_segment() {
     }
     let pet = frame(&[("bed", "dog bed", 90_000)]);
     assert_eq!(ask(&pet, "bed", "yes"), Some(Reason::Unlike));
-    // A tiny chair beside a good one does not matter.
+    // A tiny chair in addition to a good one does not matter.
     let two = frame(&[("chair", "chair", 600), ("chair", "chair", 20_000)]);
     assert_eq!(ask(&two, "chair", "yes"), None);
 }

@@ -3,7 +3,7 @@
 mod agreement;
 mod baseline;
 mod best;
-mod by_reading;
+mod by_profile;
 mod claim;
 mod comparison;
 pub mod paired;
@@ -16,9 +16,9 @@ pub use agreement::{Agreement, AgreementCounts, clustered_kappa};
 pub(super) use agreement::{agreements, kappa, light_agreements};
 pub use baseline::{BaselineRow, BaselineSide, baseline_rows};
 pub use best::{BestInTheDark, Crossing, DarkAccuracy, DarkPair, best_in_the_dark};
-pub(super) use by_reading::by_reading;
-pub use by_reading::{
-    EffectInReading, FindingByReading, NoiseHypothesis, Robustness, Support, TestedEffect,
+pub(super) use by_profile::by_profile;
+pub use by_profile::{
+    EffectInProfile, FindingByProfile, NoiseHypothesis, Robustness, Support, TestedEffect,
 };
 pub use claim::Claim;
 pub use comparison::{Comparison, ComparisonKind, MIN_PAIRS, TestedComparison, compares_models};

@@ -1,4 +1,4 @@
-//! System gain K estimated from the noise of a real pair, [`GainFit`], and of several pairs, [`ReadingFit`].
+//! System gain K estimated from the noise of a real pair, [`GainFit`], and of several pairs, [`ProfileFit`].
 //!
 //! The gain is estimated by indirect inference (Gourieroux, Monfort and Renault 1993, J. Appl. Econometrics 8:S85): the
 //! statistic of the real image, its [`SpreadCurve`], is compared with that of synthetic images over a ladder of K.
@@ -181,9 +181,10 @@ impl PooledGain {
 
 /// Fits of the gain to all pairs under one noise profile.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ReadingFit {
+pub struct ProfileFit {
     /// Name of the noise profile.
-    pub reading: ReadingName,
+    #[serde(rename = "reading")]
+    pub profile: ReadingName,
     /// Ratio r assumed by the fit, if images determine only the product r · K; `None` if r is 2^ΔEV.
     pub ratio: Option<f64>,
     /// Summary of the gains of the fitted pairs; `None` if no pair was fitted.
@@ -200,13 +201,13 @@ pub struct PairFit {
     pub fit: GainFit,
 }
 
-impl ReadingFit {
+impl ProfileFit {
     /// Combines the fits to all pairs.
     #[must_use]
-    pub fn new(reading: ReadingName, ratio: Option<f64>, pairs: Vec<PairFit>) -> Self {
+    pub fn new(profile: ReadingName, ratio: Option<f64>, pairs: Vec<PairFit>) -> Self {
         let gains: Vec<f64> = pairs.iter().filter_map(|pair| pair.fit.fitted()).collect();
         Self {
-            reading,
+            profile,
             ratio,
             pooled: PooledGain::new(&gains),
             pairs,
@@ -293,7 +294,7 @@ mod tests {
 
     /// A pair is evaluated without its own gain; with fewer than three fitted pairs, the result is marked as using it.
     /// Fit of pairs with these gains.
-    fn fit_of_pairs(gains: &[Option<f64>]) -> ReadingFit {
+    fn fit_of_pairs(gains: &[Option<f64>]) -> ProfileFit {
         let pairs = gains.iter().enumerate().map(|(index, gain)| PairFit {
             pair: index.to_string(),
             fit: GainFit {
@@ -302,7 +303,7 @@ mod tests {
                 outcome: gain.map_or(FitOutcome::Misfit, |_| FitOutcome::Fitted),
             },
         });
-        ReadingFit::new(ReadingName::PAPER, Some(200.0), pairs.collect())
+        ProfileFit::new(ReadingName::PAPER, Some(200.0), pairs.collect())
     }
 
     #[test]

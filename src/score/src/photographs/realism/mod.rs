@@ -81,7 +81,8 @@ pub struct NoiseComparison {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct NoiseMethod {
     /// Name of the noise profile.
-    pub reading: ReadingName,
+    #[serde(rename = "reading")]
+    pub profile: ReadingName,
     pub camera: CameraOrigin,
 }
 
@@ -116,7 +117,7 @@ impl fmt::Display for NoiseMethod {
             CameraOrigin::OtherPairs => ", gain fitted to the other pairs",
             CameraOrigin::SamePairs => ", gain fitted to the same pairs",
         };
-        f.pad(&format!("{}{fitted}", self.reading))
+        f.pad(&format!("{}{fitted}", self.profile))
     }
 }
 

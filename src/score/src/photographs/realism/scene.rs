@@ -206,7 +206,7 @@ mod tests {
         assert!(SceneMatch::new(&normal, &low(&mirrored, 4.0), 4.4).is_of_two_scenes());
     }
 
-    /// Nothing can be said of a bare wall, of structure below the noise, or of very small images.
+    /// Bare walls, structure below the noise and very small images are not judged.
     #[test]
     fn images_without_structure_are_not_judged() {
         let [height, width] = SIZE;

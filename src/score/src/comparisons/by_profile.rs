@@ -1,4 +1,4 @@
-//! Findings about noise, tested under each noise profile: [`FindingByReading`].
+//! Findings about noise, tested under each noise profile: [`FindingByProfile`].
 //!
 //! The paper's noise model can be interpreted in several ways; each interpretation is a noise profile. A conclusion that holds under only
 //! one profile is a conclusion about that profile. Each finding is therefore computed under every profile, on the same items and by the
@@ -146,9 +146,9 @@ impl Robustness {
 
 /// Effect of a claim under one noise profile.
 #[derive(Debug, Clone, PartialEq)]
-pub struct EffectInReading {
+pub struct EffectInProfile {
     /// Noise profile.
-    pub reading: ReadingName,
+    pub profile: ReadingName,
     /// Accuracy of the first side minus that of the second, averaged over the levels; `n` is the number of items. `None` if a side was
     /// not asked.
     pub effect: Option<TestedEffect>,
@@ -169,7 +169,7 @@ pub struct TestedEffect {
 
 /// Test results of a claim about one model under every noise profile, on the same items.
 #[derive(Debug, Clone, PartialEq)]
-pub struct FindingByReading {
+pub struct FindingByProfile {
     /// Model.
     pub model: String,
     /// Runs that showed these images, if the runs of the report showed different ones.
@@ -181,7 +181,7 @@ pub struct FindingByReading {
     /// The model asked without images that [`NoiseHypothesis::BelowBlind`] compares with, if it is not `model` itself.
     pub blind: Option<String>,
     /// Effect under each profile of the report, `paper` first.
-    pub effects: Vec<EffectInReading>,
+    pub effects: Vec<EffectInProfile>,
     /// Summary over all profiles.
     pub robustness: Robustness,
     /// Number of items left out because they were asked, but not answered on every side, level and profile.
@@ -190,14 +190,14 @@ pub struct FindingByReading {
 
 /// Tests all claims of each model under every noise profile; empty if the grid has fewer than two profiles.
 #[must_use]
-pub(crate) fn by_reading(grid: &Grid<'_>) -> Vec<FindingByReading> {
-    let readings: BTreeSet<&ReadingName> = noisy_subjects(grid)
+pub(crate) fn by_profile(grid: &Grid<'_>) -> Vec<FindingByProfile> {
+    let profiles: BTreeSet<&ReadingName> = noisy_subjects(grid)
         .filter_map(|subject| subject.variant.reading.as_ref())
         .collect();
-    if readings.len() < 2 {
+    if profiles.len() < 2 {
         return Vec::new();
     }
-    let readings: Vec<&ReadingName> = readings.into_iter().collect();
+    let profiles: Vec<&ReadingName> = profiles.into_iter().collect();
     let models: BTreeSet<(&str, Option<&RunGroup>)> = noisy_subjects(grid)
         .map(|subject| (&*subject.model, subject.variant.group.as_ref()))
         .collect();
@@ -211,11 +211,11 @@ pub(crate) fn by_reading(grid: &Grid<'_>) -> Vec<FindingByReading> {
                 .map(move |claim| (model, group, claim))
         })
         .collect();
-    let findings: Vec<FindingByReading> = tests
+    let findings: Vec<FindingByProfile> = tests
         .into_par_iter()
         .filter_map(|(model, group, claim)| {
             let lookup = SideLookup { grid, model, group };
-            finding(&lookup, claim, &readings)
+            finding(&lookup, claim, &profiles)
         })
         .collect();
     with_holm_correction(findings)
@@ -270,11 +270,11 @@ impl SideLookup<'_, '_> {
         &self,
         claim: &NoiseHypothesis,
         level: AxisLevel,
-        reading: &ReadingName,
+        profile: &ReadingName,
     ) -> Option<(usize, usize)> {
         let noisy = Variant {
             kind: Some(Kind::Sensor),
-            reading: Some(reading.clone()),
+            reading: Some(profile.clone()),
             pair: None,
             group: self.group.cloned(),
         };
@@ -330,21 +330,21 @@ impl SideLookup<'_, '_> {
 fn finding(
     lookup: &SideLookup<'_, '_>,
     claim: NoiseHypothesis,
-    readings: &[&ReadingName],
-) -> Option<FindingByReading> {
-    let levels: Vec<AxisLevel> = readings
+    profiles: &[&ReadingName],
+) -> Option<FindingByProfile> {
+    let levels: Vec<AxisLevel> = profiles
         .iter()
-        .map(|reading| asked_levels(lookup, &claim, reading))
+        .map(|profile| asked_levels(lookup, &claim, profile))
         .filter(|levels| !levels.is_empty())
         .reduce(|shared, levels| &shared & &levels)?
         .into_iter()
         .collect();
-    let pairs: Vec<Vec<(usize, usize)>> = readings
+    let pairs: Vec<Vec<(usize, usize)>> = profiles
         .iter()
-        .map(|reading| {
+        .map(|profile| {
             levels
                 .iter()
-                .map(|level| lookup.find(&claim, *level, reading))
+                .map(|level| lookup.find(&claim, *level, profile))
                 .collect::<Option<_>>()
                 .unwrap_or_default()
         })
@@ -361,18 +361,18 @@ fn finding(
         .then(|| lookup.blind())
         .flatten()
         .map(|index| lookup.grid.subjects[index].model.clone());
-    Some(FindingByReading {
+    Some(FindingByProfile {
         model: lookup.model.to_owned(),
         group: lookup.group.cloned(),
         robustness: Robustness::Open,
         claim,
         levels,
         blind: blind.filter(|name| name != lookup.model),
-        effects: readings
+        effects: profiles
             .iter()
             .zip(effects)
-            .map(|(reading, effect)| EffectInReading {
-                reading: (*reading).clone(),
+            .map(|(profile, effect)| EffectInProfile {
+                profile: (*profile).clone(),
                 effect,
             })
             .collect(),
@@ -384,12 +384,12 @@ fn finding(
 fn asked_levels(
     lookup: &SideLookup<'_, '_>,
     claim: &NoiseHypothesis,
-    reading: &ReadingName,
+    profile: &ReadingName,
 ) -> BTreeSet<AxisLevel> {
     claim
         .levels()
         .into_iter()
-        .filter(|level| lookup.find(claim, *level, reading).is_some())
+        .filter(|level| lookup.find(claim, *level, profile).is_some())
         .collect()
 }
 
@@ -459,11 +459,11 @@ fn effect(grid: &Grid<'_>, pairs: &[(usize, usize)], kept: &[usize]) -> Option<T
 }
 
 /// Fills in the corrected p-values, test results and summaries, with Holm's correction over all findings and profiles.
-fn with_holm_correction(mut findings: Vec<FindingByReading>) -> Vec<FindingByReading> {
+fn with_holm_correction(mut findings: Vec<FindingByProfile>) -> Vec<FindingByProfile> {
     let p_values: Vec<f64> = findings
         .iter()
         .flat_map(|finding| &finding.effects)
-        .filter_map(|in_reading| in_reading.effect)
+        .filter_map(|in_profile| in_profile.effect)
         .map(|effect| effect.p)
         .collect();
     let mut corrected = holm(&p_values).into_iter();
@@ -472,7 +472,7 @@ fn with_holm_correction(mut findings: Vec<FindingByReading>) -> Vec<FindingByRea
         for (effect, holm) in finding
             .effects
             .iter_mut()
-            .filter_map(|in_reading| in_reading.effect.as_mut())
+            .filter_map(|in_profile| in_profile.effect.as_mut())
             .zip(&mut corrected)
         {
             effect.holm = holm;
@@ -495,7 +495,7 @@ fn support(effect: &TestedEffect, expects_gain: bool) -> Support {
 }
 
 /// Summarizes a claim over the profiles. A profile that was not asked has no effect, so the claim then cannot hold under all.
-fn robustness(effects: &[EffectInReading]) -> Robustness {
+fn robustness(effects: &[EffectInProfile]) -> Robustness {
     let [holding, opposite] = [Support::Holds, Support::Opposite].map(|support| {
         effects
             .iter()
