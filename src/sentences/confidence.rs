@@ -6,7 +6,7 @@ use darkqa_score::calibration::Calibration;
 use darkqa_score::calibration::MIN_CONFIDENT_REPLIES;
 use darkqa_score::cluster::{ClusterUnit, MIN_SCENES};
 use darkqa_score::findings::Findings;
-use darkqa_score::subject::ModelInCondition;
+use darkqa_score::model_in_condition::ModelInCondition;
 
 /// The confidence of a model in the images of a light: at the darkest level, and at L0 if that was asked.
 #[derive(Debug, Clone, Copy)]

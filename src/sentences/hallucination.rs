@@ -10,8 +10,8 @@ use darkqa_score::answers::confusion::{Collapse, FalseAnswer, MIN_EXCESS};
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::PooledFinding;
 use darkqa_score::findings::Findings;
+use darkqa_score::model_in_condition::ModelInCondition;
 use darkqa_score::significance::Significance;
-use darkqa_score::subject::ModelInCondition;
 
 /// How often a false answer is given at the darkest level at which its rate is shown to grow.
 pub(super) fn false_answers(

@@ -5,8 +5,8 @@ use super::sentence::{Numbers, Sentence, Tone, level_runs, models};
 use crate::types::AxisLevel;
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::{Claim, PooledFinding};
+use darkqa_score::model_in_condition;
 use darkqa_score::significance::Significance;
-use darkqa_score::subject;
 
 /// Largest number of sentences about one enhancer.
 const MAX_PER_ENHANCER: usize = 3;
@@ -243,7 +243,7 @@ fn no_effect(
 
 /// Whether a finding is about the observer alone. It has its own words: what it does not confirm need not be lost.
 fn is_observer(finding: &PooledFinding) -> bool {
-    matches!(&finding.models[..], [one] if subject::is_observer(one))
+    matches!(&finding.models[..], [one] if model_in_condition::is_observer(one))
 }
 
 /// The end of a sentence about an effect that [`is_unconfirmed`].

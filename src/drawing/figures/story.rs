@@ -5,7 +5,7 @@ use crate::drawing::chart::{LineItems, LineStyle, PanelContent, PlotLine};
 use crate::text::words::light;
 use crate::types::{EnhancerName, Variant};
 use darkqa_score::findings::Findings;
-use darkqa_score::subject::CHANCE;
+use darkqa_score::model_in_condition::CHANCE;
 
 /// Accuracy over the levels in one variant: each model raw, and each with each enhancer.
 #[derive(Debug, Clone)]

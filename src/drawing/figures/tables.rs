@@ -11,7 +11,7 @@ use darkqa_score::choice::ReadingMode;
 use darkqa_score::comparisons::PooledKind;
 use darkqa_score::estimate::Estimate;
 use darkqa_score::findings::Findings;
-use darkqa_score::subject::ModelInCondition;
+use darkqa_score::model_in_condition::ModelInCondition;
 
 /// The words about marks in captions.
 const BELOW: &str = "↓: shown to be below the answers without images.";

@@ -7,7 +7,7 @@ use crate::drawing::figures::Drawing;
 use darkqa_score::choice::ReadingMode;
 use darkqa_score::comparisons::ComparisonKind;
 use darkqa_score::findings::Findings;
-use darkqa_score::subject::ModelInCondition;
+use darkqa_score::model_in_condition::ModelInCondition;
 
 /// Accuracy of each model in the light, on photographs in the dark, on synthetic images that are as dark, and on enhanced
 /// photographs; `None` where no scene was photographed in the dark.

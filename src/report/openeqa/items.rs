@@ -10,8 +10,8 @@ use crate::report::page::data::{
 };
 use crate::text::words;
 use crate::types::{AxisLevel, View};
+use darkqa_score::model_in_condition;
 use darkqa_score::open::{AnswerOutcome, Group};
-use darkqa_score::subject;
 
 /// Why an answer has no mark, by the index that `why` has of it.
 const REASONS: [&str; 3] = ["", "the judge’s reply has no mark", "no judge was asked"];
@@ -21,7 +21,7 @@ const REASONS: [&str; 3] = ["", "the judge’s reply has no mark", "no judge was
 /// # Errors
 /// If the data cannot be written.
 pub(super) fn packed(report: &OpenReport<'_>) -> Result<String> {
-    let subjects: Vec<&subject::ModelInCondition> = report
+    let subjects: Vec<&model_in_condition::ModelInCondition> = report
         .summary
         .cells
         .iter()
@@ -44,7 +44,7 @@ struct Results<'a> {
 
 fn data<'a>(
     report: &'a OpenReport<'_>,
-    subjects: &[&'a subject::ModelInCondition],
+    subjects: &[&'a model_in_condition::ModelInCondition],
     limit: SizeLimit,
 ) -> PageData<'a> {
     let (mut frames, mut families) = (Distinct::new(), Distinct::new());
@@ -92,12 +92,16 @@ fn data<'a>(
 }
 
 fn shown<'a>(
-    own: &'a subject::ModelInCondition,
-    all: &[&subject::ModelInCondition],
+    own: &'a model_in_condition::ModelInCondition,
+    all: &[&model_in_condition::ModelInCondition],
 ) -> ModelInCondition<'a> {
     let clean = own.level.and_then(|_| {
-        let clean =
-            subject::ModelInCondition::with_images(&own.model, AxisLevel::L0, &own.variant, None);
+        let clean = model_in_condition::ModelInCondition::with_images(
+            &own.model,
+            AxisLevel::L0,
+            &own.variant,
+            None,
+        );
         all.iter()
             .position(|other| other.matches_up_to_group(&clean))
     });
@@ -120,8 +124,11 @@ fn shown<'a>(
 }
 
 /// The answers, an item for each question; where several people answered, further items of the same question.
-fn results<'a>(report: &'a OpenReport<'_>, subjects: &[&subject::ModelInCondition]) -> Results<'a> {
-    let places: BTreeMap<&subject::ModelInCondition, usize> =
+fn results<'a>(
+    report: &'a OpenReport<'_>,
+    subjects: &[&model_in_condition::ModelInCondition],
+) -> Results<'a> {
+    let places: BTreeMap<&model_in_condition::ModelInCondition, usize> =
         subjects.iter().copied().zip(0..).collect();
     let mut cells = HashMap::<(usize, usize), Vec<&ReportedAnswer>>::new();
     for answer in report.answers {

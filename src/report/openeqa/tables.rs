@@ -11,8 +11,8 @@ use crate::text::terminal::texts;
 use crate::text::words::ends;
 use crate::types::degradations::Axis;
 use darkqa_score::estimate::Estimate;
+use darkqa_score::model_in_condition::ModelInCondition;
 use darkqa_score::open::{Baseline, Group, OpenCell, OpenSummary};
-use darkqa_score::subject::ModelInCondition;
 
 /// Name of the page section that has all tables.
 pub(super) const SECTION: &str = "scores";

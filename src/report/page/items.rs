@@ -124,29 +124,33 @@ fn code(result: TrialResult, mode: ReadingMode) -> u8 {
 }
 
 fn subjects<'a>(grid: &'a Grid<'_>) -> Vec<ModelInCondition<'a>> {
-    let subject = |subject: &'a darkqa_score::subject::ModelInCondition| ModelInCondition {
-        name: crate::text::words::name(subject),
-        model: &subject.model,
-        condition: subject.condition(),
-        light: match subject.view {
-            Some(View::Blind) => "blind".to_owned(),
-            _ => crate::text::words::light(&subject.variant, subject.enhancer.as_ref()),
-        },
-        level: subject.level,
-        variant: subject.variant.to_string(),
-        enhancer: subject
-            .enhancer
-            .as_ref()
-            .map(crate::types::EnhancerName::as_str),
-        clean: clean(grid, subject),
-    };
+    let subject =
+        |subject: &'a darkqa_score::model_in_condition::ModelInCondition| ModelInCondition {
+            name: crate::text::words::name(subject),
+            model: &subject.model,
+            condition: subject.condition(),
+            light: match subject.view {
+                Some(View::Blind) => "blind".to_owned(),
+                _ => crate::text::words::light(&subject.variant, subject.enhancer.as_ref()),
+            },
+            level: subject.level,
+            variant: subject.variant.to_string(),
+            enhancer: subject
+                .enhancer
+                .as_ref()
+                .map(crate::types::EnhancerName::as_str),
+            clean: clean(grid, subject),
+        };
     grid.subjects.iter().map(subject).collect()
 }
 
 /// Index of the subject of the clean frames of a subject with images.
-fn clean(grid: &Grid<'_>, of: &darkqa_score::subject::ModelInCondition) -> Option<usize> {
+fn clean(
+    grid: &Grid<'_>,
+    of: &darkqa_score::model_in_condition::ModelInCondition,
+) -> Option<usize> {
     of.level?;
-    let clean = darkqa_score::subject::ModelInCondition::with_images(
+    let clean = darkqa_score::model_in_condition::ModelInCondition::with_images(
         &of.model,
         AxisLevel::L0,
         &of.variant,

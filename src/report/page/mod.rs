@@ -38,7 +38,7 @@ use crate::types::flags::spelled_setting;
 use crate::types::manifests::RunManifest;
 use darkqa_score::answers::confusion::Confusion;
 use darkqa_score::grid::Grid;
-use darkqa_score::subject::{ModelInCondition, models_under_test};
+use darkqa_score::model_in_condition::{ModelInCondition, models_under_test};
 
 /// The template of the page, its style and its script.
 const PAGE: &str = include_str!("page.html");

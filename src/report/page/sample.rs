@@ -83,7 +83,7 @@ fn fates(grid: &Grid<'_>) -> Vec<Fate> {
         let fate = if base.enhancer.take().is_some() {
             [Fate::Harmed, Fate::Rescued]
         } else {
-            base = darkqa_score::subject::ModelInCondition::with_images(
+            base = darkqa_score::model_in_condition::ModelInCondition::with_images(
                 &of.model,
                 AxisLevel::L0,
                 &of.variant,

@@ -113,7 +113,7 @@ pub(super) fn people_alerts(combined: &Combined) -> Vec<Alert> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use darkqa_score::subject::ModelInCondition;
+    use darkqa_score::model_in_condition::ModelInCondition;
 
     #[test]
     fn one_condition_that_cannot_be_read_is_named() {

@@ -15,11 +15,11 @@ use super::comparisons::{
     light_agreements, lights_between, models_left_out, pool, pooled,
 };
 use super::grid::Grid;
+use super::model_in_condition::{ModelInCondition, is_control, is_observer};
 use super::observed::ObserverSummary;
 use super::photographs::pair_darkness::{self, PairDarkness};
 use super::photographs::{FidelityFindings, PhotographedSet};
 use super::significance::Significance;
-use super::subject::{ModelInCondition, is_control, is_observer};
 use darkqa_ground::types::{
     ChoiceDetail, Family, ImageFidelity, ModelListing, RunQuestion, Trials, Variant,
 };

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use super::choice::ReadingMode;
 use super::cluster::Clusters;
 use super::estimate::ClusterCount;
-use super::subject::ModelInCondition;
+use super::model_in_condition::ModelInCondition;
 use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{
     AnswerReading, AskedItem, ChoiceDetail, Family, ModelListing, TrialOutcome, TrialRef, Trials,

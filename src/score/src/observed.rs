@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::cluster::Clusters;
 use super::estimate::Estimate;
-use super::subject::{ModelInCondition, is_control, is_observer};
+use super::model_in_condition::{ModelInCondition, is_control, is_observer};
 use darkqa_ground::types::replies::OBSERVER;
 use darkqa_ground::types::{
     AnswerSource, ChoiceDetail, Control, FrameId, Observed, QuestionId, TrialOutcome, TrialRef,

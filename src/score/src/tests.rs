@@ -7,8 +7,8 @@ use super::comparisons::paired::PairedComparison;
 use super::comparisons::{PooledFinding, PooledKind, best_in_the_dark, pooled};
 use super::findings::Findings;
 use super::grid::Grid;
+use super::model_in_condition::ModelInCondition;
 use super::significance::Significance;
-use super::subject::ModelInCondition;
 use darkqa_ground::types::{
     AnswerReading, ChoiceDetail, Condition, Digest, Family, FrameId, QuestionId, Record,
     TrialOutcome,

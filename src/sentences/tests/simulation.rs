@@ -17,8 +17,8 @@ use darkqa_score::cluster::{Clusters, FrameTies};
 use darkqa_score::comparisons::{PooledKind, baseline_rows};
 use darkqa_score::findings::Findings;
 use darkqa_score::grid::Grid;
+use darkqa_score::model_in_condition::ModelInCondition;
 use darkqa_score::significance::Significance;
-use darkqa_score::subject::ModelInCondition;
 
 /// The questions of a simulated run, and the truth.
 #[derive(Debug, Clone, Copy)]

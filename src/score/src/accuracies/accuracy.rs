@@ -10,7 +10,7 @@ use super::health::Health;
 use crate::choice::ReadingMode;
 use crate::estimate::{ClusterCount, Estimate};
 use crate::grid::{Grid, GridItem, TrialResult};
-use crate::subject::{CHANCE, ModelInCondition};
+use crate::model_in_condition::{CHANCE, ModelInCondition};
 use darkqa_ground::types::{Family, UnreadReason, Variant};
 
 /// Accuracy of one subject on one family in one parsing.

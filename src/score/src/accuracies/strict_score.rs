@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use crate::choice::ReadingMode;
 use crate::estimate::{ClusterCount, Estimate};
 use crate::grid::{Grid, TrialResult};
-use crate::subject::ModelInCondition;
+use crate::model_in_condition::ModelInCondition;
 use darkqa_ground::types::{Family, QuestionId, RunQuestion, StrictGroup};
 
 /// Share of groups in which a subject answers all questions right, in one parsing.

@@ -6,8 +6,8 @@ use crate::choice::ReadingMode;
 use crate::comparisons::paired::PairedComparison;
 use crate::estimate::{ClusterCount, Estimate};
 use crate::grid::{Grid, GridItem};
+use crate::model_in_condition::ModelInCondition;
 use crate::significance::ALPHA;
-use crate::subject::ModelInCondition;
 use darkqa_ground::types::{AxisLevel, Family};
 
 /// Maximum number of different answers of a family that gets a confusion table.

@@ -2,7 +2,7 @@
 
 use super::confident_reply::usable_probabilities;
 use crate::grid::Grid;
-use crate::subject::ModelInCondition;
+use crate::model_in_condition::ModelInCondition;
 use darkqa_ground::types::View;
 
 /// Returns, for each item, its cluster and the Jensen–Shannon distance, from 0 to 1, between the probabilities of a subject and those of

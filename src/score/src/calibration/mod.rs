@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 use super::bootstrap::Resamples;
 use super::estimate::Estimate;
 use super::grid::Grid;
-use super::subject::ModelInCondition;
+use super::model_in_condition::ModelInCondition;
 use confident_reply::{ConfidentReply, accuracy, confident_replies};
 use darkqa_ground::types::AxisLevel;
 use darkqa_statistics::auc::{Auc, PairCounts, RankedReply};

@@ -4,7 +4,7 @@ use super::comparison::{ComparisonKind, pairs};
 use crate::choice::ReadingMode;
 use crate::estimate::{ClusterCount, Estimate};
 use crate::grid::Grid;
-use crate::subject::ModelInCondition;
+use crate::model_in_condition::ModelInCondition;
 use darkqa_statistics::quantiles::{degrees_of_freedom, student};
 
 /// Agreement of two models in one condition, in the strict parsing.

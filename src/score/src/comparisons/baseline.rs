@@ -6,8 +6,8 @@ use super::paired::PairedComparison;
 use crate::accuracies::Health;
 use crate::choice::ReadingMode;
 use crate::grid::Grid;
+use crate::model_in_condition::ModelInCondition;
 use crate::significance::{ALPHA, Significance, least_p};
-use crate::subject::ModelInCondition;
 
 /// Comparison of a model in a condition between the new runs and the old one.
 #[derive(Debug, Clone, PartialEq)]

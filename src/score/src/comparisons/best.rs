@@ -11,8 +11,8 @@ use crate::accuracies::{Coverage, shared};
 use crate::choice::ReadingMode;
 use crate::estimate::{ClusterCount, Estimate};
 use crate::grid::Grid;
+use crate::model_in_condition::ModelInCondition;
 use crate::significance::{ALPHA, Significance, SwapMethod, least_p};
-use crate::subject::ModelInCondition;
 use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{AxisLevel, Variant};
 

@@ -14,8 +14,8 @@ use super::paired::{ClusterNet, PairedTest};
 use crate::choice::ReadingMode;
 use crate::estimate::Estimate;
 use crate::grid::Grid;
+use crate::model_in_condition::ModelInCondition;
 use crate::significance::{ALPHA, holm};
-use crate::subject::ModelInCondition;
 use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{AxisLevel, EnhancerName, Family, ReadingName, RunGroup, Variant, View};
 

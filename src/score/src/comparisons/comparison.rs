@@ -9,8 +9,8 @@ use super::holm_of;
 use super::paired::PairedComparison;
 use crate::choice::ReadingMode;
 use crate::grid::Grid;
+use crate::model_in_condition::{ModelInCondition, models_under_test};
 use crate::significance::{Significance, least_p};
-use crate::subject::{ModelInCondition, models_under_test};
 use darkqa_ground::types::{AxisLevel, Family, PairDark, Variant, View};
 use rayon::prelude::*;
 

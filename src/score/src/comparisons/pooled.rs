@@ -14,8 +14,8 @@ use super::paired::{ClusterNet, PairedTest};
 use super::pooled_kind::PooledKind;
 use crate::accuracies::{Coverage, Lacking, shared};
 use crate::grid::{Grid, TrialResult};
+use crate::model_in_condition::{ModelInCondition, pooled_models};
 use crate::significance::{Significance, least_p};
-use crate::subject::{ModelInCondition, pooled_models};
 use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{AxisLevel, EnhancerName, Family, Variant, View};
 

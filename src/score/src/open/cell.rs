@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::answer::{AnswerOutcome, ScoredAnswer};
 use super::group::Group;
 use crate::estimate::Estimate;
-use crate::subject::ModelInCondition;
+use crate::model_in_condition::ModelInCondition;
 
 /// Maximum number of independent binary replies that one mark may count as. A mark on a five-step scale varies less than a binary reply
 /// with the same mean, unless all marks are 1 or 5.

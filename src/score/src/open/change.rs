@@ -6,7 +6,7 @@ use super::answer::ScoredAnswer;
 use super::group::Group;
 use crate::comparisons::paired::difference;
 use crate::estimate::Estimate;
-use crate::subject::ModelInCondition;
+use crate::model_in_condition::ModelInCondition;
 use darkqa_ground::types::{AxisLevel, View};
 
 /// Subject that a score is compared with.

@@ -15,7 +15,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use self::cell::cell;
 use self::change::{baselines, change};
 use self::group::groups;
-use super::subject::ModelInCondition;
+use super::model_in_condition::ModelInCondition;
 use darkqa_ground::types::ModelListing;
 
 pub use answer::{AnswerOutcome, ScoredAnswer};

@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use crate::choice::ReadingMode;
 use crate::grid::Grid;
+use crate::model_in_condition::{ModelInCondition, pooled_models};
 use crate::significance::{Significance, holm};
-use crate::subject::{ModelInCondition, pooled_models};
 use darkqa_ground::types::{
     AxisLevel, Digest, EnhancerName, Family, FrameId, ImageFidelity, Variant, View,
 };

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use crate::grid::Grid;
+use crate::model_in_condition::ModelInCondition;
 use crate::photographs::pair_darkness::{PairDarkness, pair_facts};
-use crate::subject::ModelInCondition;
 use darkqa_ground::types::degradations::Axis;
 use darkqa_ground::types::{Variant, View};
 

@@ -7,7 +7,7 @@ use crate::choice::ReadingMode;
 use crate::estimate::ClusterCount;
 use crate::estimate::Estimate;
 use crate::grid::Grid;
-use crate::subject::ModelInCondition;
+use crate::model_in_condition::ModelInCondition;
 use crate::threshold::{LevelCounts, NoThreshold, Threshold};
 use darkqa_ground::types::{AxisLevel, EnhancerName, Family, Variant};
 
