@@ -127,18 +127,17 @@ impl BiasFit {
     /// Weighted means of the planes in ADU, with one weight for each group.
     pub(super) fn offsets(&self, weights: &[f64]) -> Vec<f64> {
         let planes = self.groups.first().map_or(0, |group| group.planes.len());
-        let mean = |plane: usize| {
-            let [count, sum] =
-                self.groups
-                    .iter()
-                    .zip(weights)
-                    .fold([0.0; 2], |[count, sum], (group, weight)| {
-                        let [n, more] = group.planes[plane];
-                        [count + weight * n as f64, sum + weight * more as f64]
-                    });
-            sum / count
-        };
-        (0..planes).map(mean).collect()
+        (0..planes)
+            .map(|plane| {
+                let (mut count, mut sum) = (0.0, 0.0);
+                for (group, weight) in self.groups.iter().zip(weights) {
+                    let [n, more] = group.planes[plane];
+                    count += weight * n as f64;
+                    sum += weight * more as f64;
+                }
+                sum / count
+            })
+            .collect()
     }
 
     /// Weighted variances of the noise within rows and of the row noise in ADU², with one weight for each group.
@@ -177,27 +176,25 @@ impl FirstPass {
             noises: Vec::new(),
         };
         let none = HotPixels::none(reader.layout.plane_rows());
-        let work = |group: &&[PathBuf]| {
-            let frames = read_group(reader, group)?;
-            for (path, frame) in group.iter().zip(&frames) {
-                checks::codes(&frame.samples)
-                    .map_err(|problem| Error::data(path.display(), problem))?;
-            }
-            let noise = match &frames[..] {
-                [a, b] => {
-                    let sums = PairSums::new(reader.layout, [&a.samples, &b.samples], &none);
-                    Some(sums.noise())
-                }
-                _ => None,
-            };
-            Ok((frames, noise))
-        };
         in_batches(
             &groups,
             2 * reader.bytes_of_frame(),
-            work,
-            |group, result| {
-                let (frames, noise) = result;
+            |group| {
+                let frames = read_group(reader, group)?;
+                for (path, frame) in group.iter().zip(&frames) {
+                    checks::codes(&frame.samples)
+                        .map_err(|problem| Error::data(path.display(), problem))?;
+                }
+                let noise = match &frames[..] {
+                    [a, b] => {
+                        let sums = PairSums::new(reader.layout, [&a.samples, &b.samples], &none);
+                        Some(sums.noise())
+                    }
+                    _ => None,
+                };
+                Ok((frames, noise))
+            },
+            |group, (frames, noise)| {
                 for (path, frame) in group.iter().zip(&frames) {
                     inputs.add_unique(path, &frame.facts)?;
                     pass.mean.add(&frame.samples);
@@ -223,17 +220,21 @@ fn second_pass(
 ) -> Result<Vec<GroupWork>> {
     let groups: Vec<&[PathBuf]> = files.chunks(2).collect();
     let mut works = Vec::with_capacity(groups.len());
-    let work = |group: &&[PathBuf]| {
-        let frames = read_group(reader, group)?;
-        let work = group_work(reader, &frames, hot, centres);
-        checks::correlation(work.correlation)
-            .map_err(|problem| Error::data(group[0].display(), problem))?;
-        Ok(work)
-    };
-    in_batches(&groups, 2 * reader.bytes_of_frame(), work, |_, work| {
-        works.push(work);
-        Ok(())
-    })?;
+    in_batches(
+        &groups,
+        2 * reader.bytes_of_frame(),
+        |group| {
+            let frames = read_group(reader, group)?;
+            let work = group_work(reader, &frames, hot, centres);
+            checks::correlation(work.correlation)
+                .map_err(|problem| Error::data(group[0].display(), problem))?;
+            Ok(work)
+        },
+        |_, work| {
+            works.push(work);
+            Ok(())
+        },
+    )?;
     Ok(works)
 }
 

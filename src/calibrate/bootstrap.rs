@@ -28,23 +28,23 @@ impl Draws {
     pub(super) fn new(kind: DrawnGroups, groups: usize) -> Self {
         let key = NoiseKey::new(0, &FrameId("calibrate".to_owned()));
         let stream = key.stream(Component::Resamples);
-        let draw = |draw: usize| {
-            if groups < 2 {
-                return vec![1.0; groups];
-            }
-            let mut weights = vec![0.0; groups];
-            let share = groups as f64 / (groups - 1) as f64;
-            for pick in 0..groups - 1 {
-                let site = Site::new(2 * draw + kind as usize, pick);
-                // The upper half of the 64-bit product is uniform from 0 to n − 1, except for a bias of n / 2³².
-                let word = u64::from(stream.words(site, 0)[0]);
-                weights[((word * groups as u64) >> 32) as usize] += share;
-            }
-            weights
-        };
-        Self {
-            weights: (0..DRAWS).map(draw).collect(),
-        }
+        let weights = (0..DRAWS)
+            .map(|draw| {
+                if groups < 2 {
+                    return vec![1.0; groups];
+                }
+                let mut weights = vec![0.0; groups];
+                let share = groups as f64 / (groups - 1) as f64;
+                for pick in 0..groups - 1 {
+                    let site = Site::new(2 * draw + kind as usize, pick);
+                    // The upper half of the 64-bit product is uniform from 0 to n − 1, except for a bias of n / 2³².
+                    let word = u64::from(stream.words(site, 0)[0]);
+                    weights[((word * groups as u64) >> 32) as usize] += share;
+                }
+                weights
+            })
+            .collect();
+        Self { weights }
     }
 
     /// Weights of each draw.

@@ -126,13 +126,11 @@ fn step(text: &mut String, camera: &CameraFit, fit: &SettingFit) {
         with_error(fit.row_deviation)
     );
     let bias = camera.bias(fit);
-    let plane_bias = |plane: usize| {
-        bias.get(plane)
-            .or(bias.first())
-            .map_or(0.0, |bias| bias.value)
-    };
     // The order of planes is R, G1, G2, B; the order in a camera file is R, G1, B, G2.
-    let [r, g1, b, g2] = [0, 1, 3, 2].map(|plane| number(plane_bias(plane)));
+    let [r, g1, b, g2] = [0, 1, 3, 2].map(|plane| {
+        let bias = bias.get(plane).or(bias.first());
+        number(bias.map_or(0.0, |bias| bias.value))
+    });
     let _ = writeln!(
         text,
         "gain = {}\nshape = [{}]\nbias = [[{r}, {g1}, {b}, {g2}]]",

@@ -179,10 +179,15 @@ fn layout(options: ReadOptions, [width, height]: [usize; 2]) -> Result<Layout, S
     let ReadOptions { cfa, crop, .. } = options;
     let step = cfa.step();
     if let Some(crop) = crop {
-        let end = |from: usize, length: usize| from.checked_add(length);
-        let inside = end(crop.x, crop.width).is_some_and(|end| end <= width)
-            && end(crop.y, crop.height).is_some_and(|end| end <= height);
-        if !inside {
+        let ends = [
+            crop.x.checked_add(crop.width),
+            crop.y.checked_add(crop.height),
+        ];
+        let is_inside = ends
+            .iter()
+            .zip([width, height])
+            .all(|(end, size)| end.is_some_and(|end| end <= size));
+        if !is_inside {
             return Err(format!(
                 "--crop reaches beyond the frame of {width} × {height} sites"
             ));

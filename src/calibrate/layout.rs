@@ -123,8 +123,10 @@ mod tests {
             let found = found.map(|[row, parity]| cfa.plane(row, parity));
             assert_eq!(found, planes, "{cfa}");
             // The colours by name: both greens are on a diagonal.
-            let name = |plane: usize| &cfa.plane_names()[plane][..1];
-            let letters: String = found.iter().map(|plane| name(*plane)).collect();
+            let letters: String = found
+                .iter()
+                .map(|plane| &cfa.plane_names()[*plane][..1])
+                .collect();
             if cfa != Cfa::Mono {
                 assert_eq!(letters, cfa.to_string());
             }

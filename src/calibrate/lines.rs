@@ -2,6 +2,8 @@
 
 use serde::Serialize;
 
+use super::SettingFit;
+
 use darkqa_light::Calibration;
 
 /// Minimum number of settings to fit a slope.
@@ -40,6 +42,21 @@ pub(super) enum NoiseKind {
 }
 
 impl NoiseLine {
+    /// Fits the line of a kind of noise to settings.
+    pub(super) fn for_settings(settings: &[SettingFit], kind: NoiseKind) -> Self {
+        let points: Vec<[f64; 2]> = settings
+            .iter()
+            .map(|fit| {
+                let deviation = match kind {
+                    NoiseKind::Read => &fit.read_scale,
+                    NoiseKind::Row => &fit.row_deviation,
+                };
+                [fit.gain.value, deviation.value]
+            })
+            .collect();
+        Self::fit(&points, kind)
+    }
+
     /// Fits a line through points (K, σ); points without noise are left out.
     pub(super) fn fit(points: &[[f64; 2]], kind: NoiseKind) -> Self {
         let logs: Vec<[f64; 2]> = points
@@ -120,9 +137,13 @@ fn preset_slope(kind: NoiseKind) -> f64 {
 mod tests {
     use super::*;
 
+    /// Point of the line σ = 2 K^0.4.
+    fn on_line(k: f64) -> [f64; 2] {
+        [k, 2.0 * k.powf(0.4)]
+    }
+
     #[test]
     fn slopes_are_fitted_to_three_settings_or_more() {
-        let on_line = |k: f64| [k, 2.0 * k.powf(0.4)];
         let three = NoiseLine::fit(&[0.1, 1.0, 5.0].map(on_line), NoiseKind::Read);
         assert!((three.slope - 0.4).abs() < 1e-12);
         assert!((three.intercept - 2.0_f64.ln()).abs() < 1e-12);

@@ -156,9 +156,9 @@ impl MeanFrame {
     pub(super) fn pattern(&self, hot: &HotPixels, noise: PairNoise) -> f64 {
         // Relative to the medians, to keep the squares small.
         let medians = self.medians();
-        let median = |plane_row: usize| f64::from(medians[self.plane(plane_row)]) / self.frames();
         let parts = self.sums_by_part(hot, |sums: &mut [f64; 3], site| {
-            let d = site.mean - median(site.plane_row);
+            let median = f64::from(medians[self.plane(site.plane_row)]) / self.frames();
+            let d = site.mean - median;
             sums[0] += 1.0;
             sums[1] += d;
             sums[2] += d * d;
@@ -172,9 +172,10 @@ impl MeanFrame {
                 .for_each(|(sum, more)| *sum += more);
         }
         let count: f64 = planes.iter().map(|[count, ..]| count).sum();
-        let squares_about_mean =
-            |[count, sum, squares]: &[f64; 3]| squares - sum * sum / count.max(1.0);
-        let squares: f64 = planes.iter().map(squares_about_mean).sum();
+        let squares: f64 = planes
+            .iter()
+            .map(|[count, sum, squares]| squares - sum * sum / count.max(1.0))
+            .sum();
         let free = count - planes.len() as f64;
         squares / free - (noise.within + noise.row) / self.frames()
     }
@@ -182,11 +183,12 @@ impl MeanFrame {
     /// Unevenness of the plane whose tiles differ most. Row noise contributes to its error, because it shifts all sites of a row together.
     pub(super) fn unevenness(&self, hot: &HotPixels, noise: PairNoise) -> Unevenness {
         let [rows, columns] = self.layout.plane_size();
-        let tile_of = |column: usize| {
-            let tile = (0..TILES).find(|tile| Layout::tile(columns, *tile).contains(&column));
-            tile.unwrap_or(TILES - 1)
-        };
-        let tiles: Vec<usize> = (0..columns).map(tile_of).collect();
+        let tiles: Vec<usize> = (0..columns)
+            .map(|column| {
+                let tile = (0..TILES).find(|tile| Layout::tile(columns, *tile).contains(&column));
+                tile.unwrap_or(TILES - 1)
+            })
+            .collect();
         // Number of sites and sum of means for each tile column.
         let parts = self.sums_by_part(hot, |sums: &mut [f64; 2 * TILES], site| {
             let tile = 2 * tiles[site.column];

@@ -163,13 +163,6 @@ pub(crate) fn calibrate(
         let problem = format!("the black level {black} is not below white, {white}");
         return Err(Error::usage("--black", problem));
     }
-    let line = |kind: NoiseKind, deviation: fn(&SettingFit) -> f64| {
-        let points: Vec<_> = fits
-            .iter()
-            .map(|fit| [fit.gain.value, deviation(fit)])
-            .collect();
-        NoiseLine::fit(&points, kind)
-    };
     Ok(CameraFit {
         schema: "darkqa.calibration/1",
         name: settings.name.clone(),
@@ -178,8 +171,8 @@ pub(crate) fn calibrate(
         size: [reader.layout.width, reader.layout.height],
         black,
         white,
-        read_scale: line(NoiseKind::Read, |fit| fit.read_scale.value),
-        row_deviation: line(NoiseKind::Row, |fit| fit.row_deviation.value),
+        read_scale: NoiseLine::for_settings(&fits, NoiseKind::Read),
+        row_deviation: NoiseLine::for_settings(&fits, NoiseKind::Row),
         settings: fits,
         frames: inputs.count(),
         frames_digest: inputs.digest(folder)?,

@@ -26,7 +26,7 @@ use crate::types::{Axis, AxisLevel};
 use darkqa_score::accuracies::{AccuracyCell, Health};
 use darkqa_score::choice::ReadingMode;
 use darkqa_score::grid::Grid;
-use darkqa_score::subject::models_under_test;
+use darkqa_score::model_in_condition::models_under_test;
 
 /// Width of the interval column, in characters.
 const INTERVAL_WIDTH: usize = 15;

@@ -18,8 +18,8 @@ use darkqa_score::accuracies::healths;
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::{BaselineRow, baseline_rows};
 use darkqa_score::grid::Grid;
+use darkqa_score::model_in_condition::{ModelInCondition, is_control, is_observer};
 use darkqa_score::significance::Significance;
-use darkqa_score::subject::{ModelInCondition, is_control, is_observer};
 
 /// The flag that makes the command fail if a model got worse.
 pub(super) const FAIL_IF_WORSE: &str = "--fail-if-worse";

@@ -18,8 +18,8 @@ use darkqa_score::accuracies::OfferedChoices;
 use darkqa_score::cluster::{ClusterUnit, Clusters, FrameTies};
 use darkqa_score::findings::Findings;
 use darkqa_score::grid::Grid;
+use darkqa_score::model_in_condition::without_run;
 use darkqa_score::photographs::PhotographedSet;
-use darkqa_score::subject::without_run;
 
 /// Joined runs of questions with choices.
 pub(super) type Combined = Joined<ChoiceDetail>;

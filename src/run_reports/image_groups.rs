@@ -8,7 +8,7 @@ use crate::types::degradations::Kind;
 use crate::types::manifests::RunManifest;
 use crate::types::{Condition, Digest, EnhancerName, RunGroup, TrialRef, Variant};
 use darkqa_score::answers::record::Detail;
-use darkqa_score::subject::is_control;
+use darkqa_score::model_in_condition::is_control;
 
 /// The conditions of one curve: a variant with or without an enhancer, at all levels.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -34,10 +34,10 @@ use crate::types::{
     ModelListing, OpenDetail, QuestionId, Record, RunQuestion, Step, Thumbnail, TrialRef,
 };
 use darkqa_score::choice::llm_match::{Protocol, mark};
+use darkqa_score::model_in_condition::ModelInCondition;
 use darkqa_score::open::{
     AnswerOutcome, OpenSummary, QuestionGroups, ScoredAnswer, open_summary_listed,
 };
-use darkqa_score::subject::ModelInCondition;
 
 /// Scored answers of a run, or of several joined into one.
 pub(crate) struct Scores {

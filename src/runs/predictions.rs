@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::ask::prompts::openeqa::blind_answer;
 use crate::types::{OpenDetail, QuestionId, Record, Step, Via, View};
 use darkqa_score::choice::llm_match::{Protocol, truncate_answer};
-use darkqa_score::subject::ModelInCondition;
+use darkqa_score::model_in_condition::ModelInCondition;
 
 /// The state of one answer.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -64,7 +64,7 @@ pub(super) fn fidelity(findings: &Findings<'_>) -> Option<Sentence> {
     let mut detail =
         format!("AUC {value} [{low}, {high}], {chance} is chance, {p}; n = {replies} replies");
     if let Some(example) = largest_gain(findings, fidelity) {
-        detail += &example_text(example, &mut numbers);
+        detail += &example_text(&example, &mut numbers);
     }
     Some(numbers.sentence("fidelity", tone, text.to_owned(), detail))
 }
@@ -110,7 +110,7 @@ fn largest_gain<'f>(
         .map(|(_, gain)| gain)
 }
 
-fn example_text(gain: Gain<'_>, numbers: &mut Numbers) -> String {
+fn example_text(gain: &Gain<'_>, numbers: &mut Numbers) -> String {
     let Gain {
         enhanced,
         raw,

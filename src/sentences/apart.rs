@@ -11,7 +11,7 @@ use darkqa_score::comparisons::pool;
 use darkqa_score::estimate::Estimate;
 use darkqa_score::findings::Findings;
 use darkqa_score::grid::Grid;
-use darkqa_score::subject::{ModelInCondition, is_reference};
+use darkqa_score::model_in_condition::{ModelInCondition, is_reference};
 
 /// A sentence for each of them: the accuracy at L0 and at the darkest level, and that of the other models on the same questions.
 pub(super) fn apart(findings: &Findings<'_>) -> Vec<Sentence> {

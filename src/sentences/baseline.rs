@@ -5,8 +5,8 @@ use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::paired::POWER;
 use darkqa_score::comparisons::{BaselineRow, MIN_PAIRS};
 use darkqa_score::estimate::largest;
+use darkqa_score::model_in_condition::models_under_test;
 use darkqa_score::significance::Significance;
-use darkqa_score::subject::models_under_test;
 
 /// Maximum number of conditions that a sentence names.
 const MAX_NAMED: usize = 3;

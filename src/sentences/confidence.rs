@@ -6,7 +6,7 @@ use darkqa_score::calibration::Calibration;
 use darkqa_score::calibration::MIN_CONFIDENT_REPLIES;
 use darkqa_score::cluster::{ClusterUnit, MIN_SCENES};
 use darkqa_score::findings::Findings;
-use darkqa_score::subject::ModelInCondition;
+use darkqa_score::model_in_condition::ModelInCondition;
 
 /// The calibration of a model with one variant: at the darkest level, and at L0 if it was asked there.
 #[derive(Debug, Clone, Copy)]

@@ -10,8 +10,8 @@ use darkqa_score::answers::confusion::{Collapse, FalseAnswer, MIN_EXCESS};
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::PooledFinding;
 use darkqa_score::findings::Findings;
+use darkqa_score::model_in_condition::ModelInCondition;
 use darkqa_score::significance::Significance;
-use darkqa_score::subject::ModelInCondition;
 
 /// The rate of a false answer at the darkest level with a detected increase.
 pub(super) fn false_answers(

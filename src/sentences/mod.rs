@@ -65,7 +65,7 @@ pub(crate) fn sentences(findings: &Findings<'_>) -> Vec<Sentence> {
     let mut sentences = Vec::new();
     sentences.extend(sample::impossible(findings));
     sentences.extend(sample::left_out(findings));
-    sentences.extend(readings::readings(&findings.by_reading, findings.unit));
+    sentences.extend(readings::readings(&findings.by_profile, findings.unit));
     sentences.extend(darkness::darkness(findings));
     sentences.extend(real::real(findings));
     sentences.extend(in_each_light(findings, about_light));

@@ -5,8 +5,8 @@ use super::sentence::{Numbers, Sentence, Tone, level_runs, models};
 use crate::types::AxisLevel;
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::{Claim, PooledFinding};
+use darkqa_score::model_in_condition;
 use darkqa_score::significance::Significance;
-use darkqa_score::subject;
 
 /// Maximum number of sentences about one enhancer.
 const MAX_PER_ENHANCER: usize = 3;
@@ -252,7 +252,7 @@ fn no_effect(
 
 /// True if a finding is about the observer alone, which has its own wording: evidence that it does not confirm may still be present.
 fn is_observer(finding: &PooledFinding) -> bool {
-    matches!(&finding.models[..], [one] if subject::is_observer(one))
+    matches!(&finding.models[..], [one] if model_in_condition::is_observer(one))
 }
 
 /// The end of a sentence about an effect that [`is_unconfirmed`].

@@ -2,13 +2,13 @@
 
 use super::sentence::{Numbers, Sentence, Tone};
 use darkqa_score::cluster::ClusterUnit;
-use darkqa_score::comparisons::{FindingByReading, NoiseHypothesis, Robustness};
+use darkqa_score::comparisons::{FindingByProfile, NoiseHypothesis, Robustness};
 
 /// The numbers of findings about noise that hold under all, some or none of the noise profiles; `None` without findings. Findings that are
 /// repeated by level count once.
-pub(super) fn readings(found: &[FindingByReading], unit: ClusterUnit) -> Option<Sentence> {
+pub(super) fn readings(found: &[FindingByProfile], unit: ClusterUnit) -> Option<Sentence> {
     let readings = found.first()?.effects.len();
-    let whole: Vec<&FindingByReading> = found
+    let whole: Vec<&FindingByProfile> = found
         .iter()
         .filter(|one| !matches!(one.claim, NoiseHypothesis::NoiseCompounds(Some(_))))
         .collect();

@@ -5,9 +5,9 @@ use crate::text::words::light;
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::{Claim, Comparison, ComparisonKind};
 use darkqa_score::findings::Findings;
+use darkqa_score::model_in_condition::models_under_test;
 use darkqa_score::photographs::pair_darkness::PairDarkness;
 use darkqa_score::significance::Significance;
-use darkqa_score::subject::models_under_test;
 
 /// Sentences about each model and each photograph: compared with the lit frame, with synthetic images of the same darkness, and with the
 /// enhanced photograph.

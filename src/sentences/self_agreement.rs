@@ -9,8 +9,8 @@ use darkqa_score::comparisons::self_agreement::SelfAgreement;
 use darkqa_score::comparisons::self_agreement::cell::{AgreementCell, CellRole};
 use darkqa_score::comparisons::self_agreement::light::LightReplies;
 use darkqa_score::comparisons::{Claim, Comparison, ComparisonKind};
+use darkqa_score::model_in_condition::models_under_test;
 use darkqa_score::significance::Significance;
-use darkqa_score::subject::models_under_test;
 
 /// All sentences of a run without true answers: models against each other at L0 first, then each model.
 #[must_use]

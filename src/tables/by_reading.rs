@@ -9,23 +9,23 @@ use crate::types::degradations::Kind;
 use crate::types::{AxisLevel, ReadingName};
 use darkqa_score::accuracies::Curve;
 use darkqa_score::comparisons::{
-    FindingByReading, NoiseHypothesis, Robustness, Support, TestedEffect,
+    FindingByProfile, NoiseHypothesis, Robustness, Support, TestedEffect,
 };
 use darkqa_score::findings::Findings;
 
 /// Two tables: the file has a row for each finding and profile; the report has a row for each finding and a column for each profile.
 /// Empty unless several noise profiles were tested.
 pub(super) fn by_reading(findings: &Findings<'_>) -> Vec<Table> {
-    let found = &findings.by_reading;
+    let found = &findings.by_profile;
     let Some(first) = found.first() else {
         return Vec::new();
     };
-    let readings: Vec<&ReadingName> = first.effects.iter().map(|effect| &effect.reading).collect();
+    let readings: Vec<&ReadingName> = first.effects.iter().map(|effect| &effect.profile).collect();
     vec![file_table(found), report_table(findings, &readings)]
 }
 
 /// Table for the file.
-fn file_table(found: &[FindingByReading]) -> Table {
+fn file_table(found: &[FindingByProfile]) -> Table {
     let rows = found
         .iter()
         .flat_map(|finding| finding.effects.iter().map(move |effect| (finding, effect)));
@@ -43,7 +43,7 @@ fn file_table(found: &[FindingByReading]) -> Table {
         })
         .column(Text, "csv blind", |(finding, _)| finding.blind.clone())
         .column(Text, "csv reading", |(_, effect)| {
-            effect.reading.to_string()
+            effect.profile.to_string()
         })
         .column(Number, "csv effect low high n", |(_, reading)| {
             reading.effect.map(|effect| effect.difference)
@@ -66,12 +66,12 @@ fn file_table(found: &[FindingByReading]) -> Table {
 
 /// Row of the report's table: a finding, or the thresholds of a finding's model.
 enum Row<'f> {
-    Finding(&'f FindingByReading),
-    Thresholds(&'f FindingByReading, Vec<&'f Curve>),
+    Finding(&'f FindingByProfile),
+    Thresholds(&'f FindingByProfile, Vec<&'f Curve>),
 }
 
 impl Row<'_> {
-    fn finding(&self) -> &FindingByReading {
+    fn finding(&self) -> &FindingByProfile {
         match self {
             Self::Finding(finding) | Self::Thresholds(finding, _) => finding,
         }
@@ -81,7 +81,7 @@ impl Row<'_> {
 /// Table for the terminal and the page: the findings of each model, then its thresholds.
 fn report_table(findings: &Findings<'_>, readings: &[&ReadingName]) -> Table {
     let mut rows = Vec::new();
-    let found = &findings.by_reading;
+    let found = &findings.by_profile;
     for same_model in found.chunk_by(|a, b| (&a.model, &a.group) == (&b.model, &b.group)) {
         rows.extend(same_model.iter().map(Row::Finding));
         let curves = noise_curves(findings, &same_model[0]);
@@ -134,7 +134,7 @@ fn report_table(findings: &Findings<'_>, readings: &[&ReadingName]) -> Table {
 }
 
 /// Curves of a finding's model with noise, without enhancement, over all families.
-fn noise_curves<'f>(findings: &'f Findings<'_>, finding: &FindingByReading) -> Vec<&'f Curve> {
+fn noise_curves<'f>(findings: &'f Findings<'_>, finding: &FindingByProfile) -> Vec<&'f Curve> {
     findings
         .curves
         .iter()
@@ -170,7 +170,7 @@ fn threshold(curves: &[&Curve], reading: &ReadingName) -> String {
 }
 
 /// Model of a finding, with its run group.
-fn subject(finding: &FindingByReading) -> String {
+fn subject(finding: &FindingByProfile) -> String {
     let group = finding.group.as_ref().map(ToString::to_string);
     finding.model.clone() + &group.unwrap_or_default()
 }
@@ -188,7 +188,7 @@ fn effect(effect: Option<&TestedEffect>) -> String {
 }
 
 /// Number of items that the effects are computed on.
-fn items(finding: &FindingByReading) -> usize {
+fn items(finding: &FindingByProfile) -> usize {
     finding
         .effects
         .iter()
@@ -210,7 +210,7 @@ fn span(levels: &[AxisLevel], complete: usize) -> String {
 }
 
 /// Hypothesis with its levels, for the table.
-fn title(finding: &FindingByReading) -> String {
+fn title(finding: &FindingByProfile) -> String {
     let levels = &finding.levels;
     match &finding.claim {
         NoiseHypothesis::NoiseCompounds(None) => {
@@ -245,7 +245,7 @@ fn title(finding: &FindingByReading) -> String {
 }
 
 /// Hypothesis as the beginning of a sentence.
-fn clause(finding: &FindingByReading) -> String {
+fn clause(finding: &FindingByProfile) -> String {
     let levels = &finding.levels;
     match &finding.claim {
         NoiseHypothesis::NoiseCompounds(None) => "Noise compounds the drop".to_owned(),
@@ -263,17 +263,17 @@ fn clause(finding: &FindingByReading) -> String {
 }
 
 /// Noise profiles under which a finding has some support. Each but [`Support::Holds`] has its interval.
-fn profiles_with_support(finding: &FindingByReading, support: Support) -> Vec<String> {
+fn profiles_with_support(finding: &FindingByProfile, support: Support) -> Vec<String> {
     finding
         .effects
         .iter()
-        .filter_map(|in_reading| Some((&in_reading.reading, in_reading.effect.as_ref()?)))
+        .filter_map(|in_profile| Some((&in_profile.profile, in_profile.effect.as_ref()?)))
         .filter(|(_, effect)| effect.support == support)
-        .map(|(reading, effect)| match support {
-            Support::Holds => reading.to_string(),
+        .map(|(profile, effect)| match support {
+            Support::Holds => profile.to_string(),
             Support::Opposite | Support::Open => {
                 format!(
-                    "{reading} ({} points)",
+                    "{profile} ({} points)",
                     ends_in_points(effect.difference).replace(", ", " to ")
                 )
             }
@@ -282,12 +282,12 @@ fn profiles_with_support(finding: &FindingByReading, support: Support) -> Vec<St
 }
 
 /// Finding under each noise profile, as in `Noise compounds the drop: holds under paper, eld; open under physical (−1.2 to +5.0 points).`
-fn sentence(finding: &FindingByReading) -> String {
+fn sentence(finding: &FindingByProfile) -> String {
     let not_asked: Vec<String> = finding
         .effects
         .iter()
-        .filter(|in_reading| in_reading.effect.is_none())
-        .map(|in_reading| in_reading.reading.to_string())
+        .filter(|in_profile| in_profile.effect.is_none())
+        .map(|in_profile| in_profile.profile.to_string())
         .collect();
     let parts: Vec<String> = [
         (
@@ -309,7 +309,7 @@ fn sentence(finding: &FindingByReading) -> String {
 }
 
 /// One sentence for each finding that some noise profile decides, and a note on items left out.
-fn notes(found: &[FindingByReading]) -> Vec<String> {
+fn notes(found: &[FindingByProfile]) -> Vec<String> {
     let models: BTreeSet<String> = found.iter().map(subject).collect();
     let mut notes: Vec<String> = found
         .iter()
@@ -342,8 +342,8 @@ mod tests {
     use darkqa_score::comparisons::EffectInReading;
     use darkqa_score::estimate::Estimate;
 
-    fn effect_in(reading: &str, low: f64, high: f64, support: Support) -> EffectInReading {
-        EffectInReading {
+    fn effect_in(reading: &str, low: f64, high: f64, support: Support) -> EffectInProfile {
+        EffectInProfile {
             reading: ReadingName::new(reading).unwrap(),
             effect: Some(TestedEffect {
                 difference: Estimate {
@@ -362,7 +362,7 @@ mod tests {
     #[test]
     fn sentences_state_intervals_of_unsupported_findings() {
         let level = AxisLevel::new(Kind::Sensor, Severity::L5);
-        let mut finding = FindingByReading {
+        let mut finding = FindingByProfile {
             model: "m".to_owned(),
             group: None,
             claim: NoiseHypothesis::NoiseCompounds(None),

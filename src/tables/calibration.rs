@@ -8,7 +8,7 @@ use darkqa_score::auc::Auc;
 use darkqa_score::calibration::{Calibration, PositionShare, ReliabilityBin};
 use darkqa_score::estimate::Estimate;
 use darkqa_score::findings::Findings;
-use darkqa_score::subject::ModelInCondition;
+use darkqa_score::model_in_condition::ModelInCondition;
 
 /// Id of the section on the page.
 pub(super) const CONFIDENCE: &str = "confidence";

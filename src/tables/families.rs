@@ -8,7 +8,7 @@ use crate::text::words::family as family_name;
 use crate::types::Family;
 use darkqa_score::choice::ReadingMode;
 use darkqa_score::findings::Findings;
-use darkqa_score::subject::ModelInCondition;
+use darkqa_score::model_in_condition::ModelInCondition;
 
 pub(super) fn families(findings: &Findings<'_>) -> Table {
     let subjects = findings.grid.subjects.iter().map(Some);

@@ -5,8 +5,8 @@ use crate::text::table::{Table, TableBuilder, TableCell};
 use crate::text::words::light;
 use crate::types::View;
 use darkqa_score::auc::Auc;
+use darkqa_score::model_in_condition::ModelInCondition;
 use darkqa_score::photographs::{ConditionFidelity, FidelityFindings};
-use darkqa_score::subject::ModelInCondition;
 
 /// Measures in the order of [`ConditionFidelity::means`]: name in CSV files, and in texts.
 const MEASURES: [(&str, &str); 2] = [("psnr", "PSNR"), ("ssim", "SSIM")];

@@ -29,7 +29,7 @@ use crate::text::table::{Table, TableBuilder, TableCell};
 use crate::text::words::{family, name};
 use crate::types::{EnhancerName, Family, ModelListing, Variant};
 use darkqa_score::findings::Findings;
-use darkqa_score::subject::ModelInCondition;
+use darkqa_score::model_in_condition::ModelInCondition;
 
 pub(crate) use answers::{commonest_answers, counted_answers};
 pub(crate) use baseline::BASELINE;

@@ -8,7 +8,7 @@ use darkqa_score::accuracies::{GroupCell, GroupChance, StrictScore};
 use darkqa_score::choice::ReadingMode;
 use darkqa_score::estimate::Estimate;
 use darkqa_score::findings::Findings;
-use darkqa_score::subject::{CHANCE, ModelInCondition};
+use darkqa_score::model_in_condition::{CHANCE, ModelInCondition};
 
 use super::summary::reading;
 

@@ -5,7 +5,7 @@ use crate::text::table::{SUMMARY, Table, TableBuilder, TableCell};
 use crate::types::{ModelListing, PairDark, RunGroup};
 use darkqa_score::accuracies::{AccuracyCell, AccuracySummary};
 use darkqa_score::choice::ReadingMode;
-use darkqa_score::subject::ModelInCondition;
+use darkqa_score::model_in_condition::ModelInCondition;
 
 /// Builds the table, with a row for each model in a condition, family and way of parsing.
 pub(crate) fn summary(summary: &AccuracySummary, listing: &ModelListing) -> Table {

@@ -8,8 +8,8 @@ use crate::text::words::light;
 use crate::types::degradations::{Axis, Kind};
 use crate::types::{AxisLevel, EnhancerName, ModelListing, RunGroup, SetLight, Variant, View};
 use darkqa_score::findings::Findings;
+use darkqa_score::model_in_condition::ModelInCondition;
 use darkqa_score::photographs::pair_darkness::PairDarkness;
-use darkqa_score::subject::ModelInCondition;
 
 /// A model in one variant, raw or with one enhancer.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]

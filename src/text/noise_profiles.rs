@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use serde::Serialize;
 
 use crate::types::ReadingName;
-use darkqa_score::subject::ModelInCondition;
+use darkqa_score::model_in_condition::ModelInCondition;
 
 /// The noise profiles of the subjects with noise, `paper` first.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]

@@ -3,7 +3,7 @@
 use crate::text::table::{ColumnKind, TableCell};
 use crate::types::{EnhancerName, Family, Variant};
 use darkqa_score::estimate::Estimate;
-use darkqa_score::subject::ModelInCondition;
+use darkqa_score::model_in_condition::ModelInCondition;
 
 /// Title of a variant and its enhancer, such as `with noise + lift`.
 pub(crate) fn light(variant: &Variant, enhancer: Option<&EnhancerName>) -> String {

@@ -38,13 +38,6 @@ fn setting(name: &str, gain: f64) -> SettingFit {
 }
 
 fn camera(settings: Vec<SettingFit>) -> CameraFit {
-    let line = |kind: NoiseKind, of: fn(&SettingFit) -> f64| {
-        let points: Vec<[f64; 2]> = settings
-            .iter()
-            .map(|fit| [fit.gain.value, of(fit)])
-            .collect();
-        NoiseLine::fit(&points, kind)
-    };
     CameraFit {
         schema: "darkqa.calibration/1",
         name: "my \"night\" cam".to_owned(),
@@ -53,8 +46,8 @@ fn camera(settings: Vec<SettingFit>) -> CameraFit {
         size: [512, 512],
         black: 512,
         white: 16383,
-        read_scale: line(NoiseKind::Read, |fit| fit.read_scale.value),
-        row_deviation: line(NoiseKind::Row, |fit| fit.row_deviation.value),
+        read_scale: NoiseLine::for_settings(&settings, NoiseKind::Read),
+        row_deviation: NoiseLine::for_settings(&settings, NoiseKind::Row),
         settings,
         frames: 30,
         frames_digest: Digest::from_bytes(b"frames"),
@@ -82,12 +75,9 @@ fn the_file_has_the_measured_values() {
     let noise = read.noise_at(0.6, [0.0; 2], [0.5; 2]);
     assert!((noise.read_shape + 0.04).abs() < 1e-9);
     // The planes R, Gr, Gb, B, whatever the order of the columns.
-    let bias = noise.bias.iter().zip([0.1, -0.1, 0.3, 0.0]);
-    assert!(
-        bias.into_iter().all(|(a, b)| (a - b).abs() < 1e-5),
-        "{:?}",
-        noise.bias
-    );
+    for (bias, expected) in noise.bias.iter().zip([0.1, -0.1, 0.3, 0.0]) {
+        assert!((bias - expected).abs() < 1e-5, "{:?}", noise.bias);
+    }
     for part in [
         "± 71 % of itself",
         "# Warning: iso100: doubtful [gain]",
@@ -110,22 +100,11 @@ fn comments<'t>(text: &'t str, table: &str) -> Vec<&'t str> {
 /// Comments state the number of settings without visible row noise.
 #[test]
 fn lines_state_their_source() {
-    let silent = |name: &str, gain: f64| SettingFit {
-        row_deviation: measured(0.0),
-        ..setting(name, gain)
-    };
     let four: Vec<SettingFit> = ["a", "b", "c", "d"]
         .into_iter()
         .zip([0.1, 0.5, 2.5, 5.0])
         .map(|(name, gain)| setting(name, gain))
         .collect();
-    let with = |quiet: &[usize], settings: usize| {
-        let mut fits = four[..settings].to_vec();
-        for index in quiet {
-            fits[*index] = silent(&fits[*index].name, fits[*index].gain.value);
-        }
-        camera_file(&camera(fits)).unwrap()
-    };
     for (quiet, settings, row) in [
         (
             &[][..],
@@ -163,7 +142,11 @@ fn lines_state_their_source() {
         ),
         (&[0, 1], 2, &["# No setting has noise of this kind."]),
     ] {
-        let text = with(quiet, settings);
+        let mut fits = four[..settings].to_vec();
+        for index in quiet {
+            fits[*index].row_deviation = measured(0.0);
+        }
+        let text = camera_file(&camera(fits)).unwrap();
         assert_eq!(comments(&text, "row-deviation"), row);
         // Read noise is visible in all settings.
         let read = comments(&text, "read-scale").concat();

@@ -3,14 +3,15 @@
 mod checks;
 mod transfer;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use super::batches::in_batches;
 use super::frames::{Frame, FrameReader};
 use super::hot_pixels::HotPixels;
 use super::inputs::Inputs;
+use super::mosaic::FrameFacts;
 use super::recording::{ExposureFiles, MIN_EXPOSURES, SettingFiles};
-use super::sums::{PairNoise, PairSums, PlaneSums, TileSums, TopCode};
+use super::sums::{PairNoise, PairSums, PlaneSums, TopCode};
 use crate::error::{Error, Result};
 use checks::{ExposureCheck, PairFacts};
 pub(super) use transfer::{Point, Transfer, gain};
@@ -190,14 +191,13 @@ fn too_few(files: &SettingFiles, usable: usize, reasons: &[String]) -> Error {
 /// Tiles of a pair whose light is in the range.
 fn in_range(pair: &PairFacts, offsets: &[f64], white: u16) -> Vec<Tile> {
     let ratios = pair.light_ratios(offsets);
-    let is_in_range = |tile: &&TileSums| {
-        let offset = offsets[tile.plane];
-        let share = (tile.mean() - offset) / (f64::from(white) - offset);
-        (RANGE[0]..=RANGE[1]).contains(&share)
-    };
     pair.tiles
         .iter()
-        .filter(is_in_range)
+        .filter(|tile| {
+            let offset = offsets[tile.plane];
+            let share = (tile.mean() - offset) / (f64::from(white) - offset);
+            (RANGE[0]..=RANGE[1]).contains(&share)
+        })
         .map(|tile| Tile {
             plane: tile.plane,
             free: tile.free,
@@ -220,30 +220,12 @@ fn read(
         .enumerate()
         .flat_map(|(index, exposure)| exposure.flats.chunks(2).map(move |pair| (index, pair)))
         .collect();
-    let layout = reader.layout;
-    let work = |(_, pair): &(usize, &[PathBuf])| {
-        let [a, b] = read_pair(reader, pair)?;
-        let sums = PairSums::new(layout, [&a.samples, &b.samples], hot);
-        let top = [&a, &b].map(|frame| TopCode::new(layout, &frame.samples, hot));
-        let [first, second] = [0, 1].map(|frame| top[frame].largest_share());
-        let facts = PairFacts {
-            names: [&pair[0], &pair[1]].map(|path| path.display().to_string()),
-            digests: [a.facts.digest, b.facts.digest],
-            greatest: top[0].max().max(top[1].max()),
-            at_top: if second.0 > first.0 { second } else { first },
-            means: sums.means(),
-            neighbours: sums.neighbours(),
-            tiles: sums.tiles(),
-        };
-        Ok((facts, [a.facts, b.facts]))
-    };
     let mut read: Vec<Vec<PairFacts>> = files.exposures.iter().map(|_| Vec::new()).collect();
     in_batches(
         &pairs,
         2 * reader.bytes_of_frame(),
-        work,
-        |item, (facts, file_facts)| {
-            let (exposure, pair) = item;
+        |(_, pair)| pair_facts(reader, pair, hot),
+        |(exposure, pair), (facts, file_facts)| {
             for (path, facts) in pair.iter().zip(&file_facts) {
                 inputs.add(path, facts);
             }
@@ -254,10 +236,32 @@ fn read(
     Ok(read)
 }
 
+/// Reads a pair of frames and computes its facts and those of its files.
+fn pair_facts(
+    reader: &FrameReader,
+    pair: &[PathBuf],
+    hot: &HotPixels,
+) -> Result<(PairFacts, [FrameFacts; 2])> {
+    let layout = reader.layout;
+    let [a, b] = read_pair(reader, pair)?;
+    let sums = PairSums::new(layout, [&a.samples, &b.samples], hot);
+    let top = [&a, &b].map(|frame| TopCode::new(layout, &frame.samples, hot));
+    let [first, second] = [0, 1].map(|frame| top[frame].largest_share());
+    let facts = PairFacts {
+        names: [&pair[0], &pair[1]].map(|path| path.display().to_string()),
+        digests: [a.facts.digest, b.facts.digest],
+        greatest: top[0].max().max(top[1].max()),
+        at_top: if second.0 > first.0 { second } else { first },
+        means: sums.means(),
+        neighbours: sums.neighbours(),
+        tiles: sums.tiles(),
+    };
+    Ok((facts, [a.facts, b.facts]))
+}
+
 /// Reads two frames on two threads.
 fn read_pair(reader: &FrameReader, pair: &[PathBuf]) -> Result<[Frame; 2]> {
-    let (first, second): (&Path, &Path) = (&pair[0], &pair[1]);
-    let (a, b) = rayon::join(|| reader.read(first), || reader.read(second));
+    let (a, b) = rayon::join(|| reader.read(&pair[0]), || reader.read(&pair[1]));
     Ok([a?, b?])
 }
 
@@ -272,26 +276,25 @@ fn dark(
     let mut planes = vec![[0_u64; 2]; layout.cfa.planes()];
     let mut noises: Vec<PairNoise> = Vec::new();
     let groups: Vec<&[PathBuf]> = exposure.dark.chunks(2).collect();
-    let work = |group: &&[PathBuf]| {
-        let frames: Vec<Frame> = group
-            .iter()
-            .map(|path| reader.read(path))
-            .collect::<Result<_>>()?;
-        let sums: Vec<Vec<[u64; 2]>> = frames
-            .iter()
-            .map(|frame| PlaneSums::new(layout, &frame.samples, hot).planes())
-            .collect();
-        let noise = match &frames[..] {
-            [a, b] => Some(PairSums::new(layout, [&a.samples, &b.samples], hot).noise()),
-            _ => None,
-        };
-        let facts: Vec<_> = frames.into_iter().map(|frame| frame.facts).collect();
-        Ok((sums, noise, facts))
-    };
     in_batches(
         &groups,
         2 * reader.bytes_of_frame(),
-        work,
+        |group| {
+            let frames: Vec<Frame> = group
+                .iter()
+                .map(|path| reader.read(path))
+                .collect::<Result<_>>()?;
+            let sums: Vec<Vec<[u64; 2]>> = frames
+                .iter()
+                .map(|frame| PlaneSums::new(layout, &frame.samples, hot).planes())
+                .collect();
+            let noise = match &frames[..] {
+                [a, b] => Some(PairSums::new(layout, [&a.samples, &b.samples], hot).noise()),
+                _ => None,
+            };
+            let facts: Vec<_> = frames.into_iter().map(|frame| frame.facts).collect();
+            Ok((sums, noise, facts))
+        },
         |group, (sums, noise, facts)| {
             for (path, facts) in group.iter().zip(&facts) {
                 inputs.add_unique(path, facts)?;

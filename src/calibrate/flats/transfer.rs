@@ -58,15 +58,17 @@ impl Transfer {
     }
 }
 
+fn sum(points: &[Point], term: impl Fn(&Point) -> f64) -> f64 {
+    points.iter().map(term).sum()
+}
+
 /// Gain K = Σ w S V / Σ w S² with w = n / (K S + read variance)², because a variance V has the variance 2 (K S + …)² / n. The weights
 /// depend on K; three iterations are enough for them to converge.
 pub(in super::super) fn gain(points: &[Point]) -> f64 {
-    let sum = |term: &dyn Fn(&Point) -> f64| points.iter().map(term).sum::<f64>();
-    let mut gain = sum(&|p| p.weight * p.variance) / sum(&|p| p.weight * p.signal);
+    let mut gain = sum(points, |p| p.weight * p.variance) / sum(points, |p| p.weight * p.signal);
     for _ in 0..3 {
-        let weight = |p: &Point| weight(p, gain);
-        let product = sum(&|p| weight(p) * p.signal * p.variance);
-        gain = product / sum(&|p| weight(p) * p.signal * p.signal);
+        let product = sum(points, |p| weight(p, gain) * p.signal * p.variance);
+        gain = product / sum(points, |p| weight(p, gain) * p.signal * p.signal);
     }
     gain
 }
@@ -136,18 +138,19 @@ mod tests {
 
     /// Points of exact variances, `of` the signal, at 40 signals.
     fn points(of: impl Fn(f64) -> f64) -> Vec<Point> {
-        let point = |i: i32| {
-            let signal = 300.0 * 1.1_f64.powi(i);
-            Point {
-                exposure: (i / 8) as usize,
-                plane: (i % 4) as usize,
-                weight: 1000.0 + f64::from(i),
-                signal,
-                variance: of(signal),
-                within: 2.0,
-            }
-        };
-        (0..40).map(point).collect()
+        (0..40)
+            .map(|i: i32| {
+                let signal = 300.0 * 1.1_f64.powi(i);
+                Point {
+                    exposure: (i / 8) as usize,
+                    plane: (i % 4) as usize,
+                    weight: 1000.0 + f64::from(i),
+                    signal,
+                    variance: of(signal),
+                    within: 2.0,
+                }
+            })
+            .collect()
     }
 
     #[test]
@@ -174,8 +177,7 @@ mod tests {
             lifted.intercept
         );
         assert!(lifted.intercept_error > 0.0 && lifted.intercept_error < 12.0);
-        let of_plane = |signal: f64| if signal < 1e9 { 0.75 * signal } else { 0.0 };
-        let mut apart = points(of_plane);
+        let mut apart = points(|signal| 0.75 * signal);
         apart
             .iter_mut()
             .filter(|p| p.plane == 3)

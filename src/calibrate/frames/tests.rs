@@ -86,7 +86,13 @@ fn crops_must_keep_the_pattern_and_fit() {
 #[test]
 fn frames_of_another_camera_are_refused() {
     let folder = tempfile::tempdir().unwrap();
-    let frame = |name: &str, model: Option<&str>| {
+    let [first, same, none, other] = [
+        ("first.tif", Some("A 1")),
+        ("same.tif", Some("A 1")),
+        ("none.tif", None),
+        ("other.tif", Some("B 2")),
+    ]
+    .map(|(name, model)| {
         let path = folder.path().join(name);
         let mut encoder = TiffEncoder::new(fs::File::create(&path).unwrap()).unwrap();
         let mut image = encoder.new_image::<Gray16>(256, 256).unwrap();
@@ -95,17 +101,13 @@ fn frames_of_another_camera_are_refused() {
         }
         image.write_data(&vec![512; 256 * 256]).unwrap();
         path
-    };
-    let first = frame("first.tif", Some("A 1"));
+    });
     let reader = FrameReader::open(&first, options(None)).unwrap();
     assert_eq!(reader.camera(), Some("A 1"));
-    reader.read(&frame("same.tif", Some("A 1"))).unwrap();
+    reader.read(&same).unwrap();
     // A file without a camera name matches any camera.
-    reader.read(&frame("none.tif", None)).unwrap();
-    let error = reader
-        .read(&frame("other.tif", Some("B 2")))
-        .unwrap_err()
-        .to_string();
+    reader.read(&none).unwrap();
+    let error = reader.read(&other).unwrap_err().to_string();
     assert!(error.contains("other.tif: taken by B 2, but"), "{error}");
     assert!(error.contains("first.tif by A 1"), "{error}");
 }

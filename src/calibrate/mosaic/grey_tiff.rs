@@ -26,13 +26,11 @@ pub(super) fn decode(bytes: &[u8], most_pixels: u64) -> Result<Decoded, String> 
         return Err(makers::message("DNG"));
     }
     let photometric = tag(Tag::PhotometricInterpretation).and_then(|value| value.into_u16().ok());
-    let text = |value: Option<tiff::decoder::ifd::Value>| {
-        let text = value?.into_string().ok()?;
+    let [maker, model, taken] = [Tag::Make, Tag::Model, Tag::DateTime].map(|name| {
+        let text = tag(name)?.into_string().ok()?;
         let text = text.trim_matches(['\0', ' ']).to_owned();
         (!text.is_empty()).then_some(text)
-    };
-    let (maker, model) = (text(tag(Tag::Make)), text(tag(Tag::Model)));
-    let taken = text(tag(Tag::DateTime));
+    });
     if photometric == Some(PhotometricInterpretation::WhiteIsZero.to_u16()) {
         return Err("a TIFF in which 0 is white; black is 0 in a mosaic".to_owned());
     }

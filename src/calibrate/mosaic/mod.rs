@@ -80,15 +80,16 @@ fn decode(path: &Path, bytes: &[u8], most_pixels: u64) -> Result<Decoded, String
 }
 
 fn png(bytes: &[u8], most_pixels: u64) -> Result<Decoded, String> {
-    let with_advice = |problem: String| format!("{problem}; copy or export it again");
     let png =
         RawPng::open(bytes, &[SampleForm::Grey16], most_pixels).map_err(|error| match error {
-            RawPngError::Broken(problem) => with_advice(problem),
+            RawPngError::Broken(problem) => format!("{problem}; copy or export it again"),
             RawPngError::TooLarge(problem) => format!("{problem}; raise --decode max-pixels"),
             RawPngError::OtherForm(problem) => developed(&problem),
         })?;
     let (height, width) = png.size;
-    let samples = png.samples(|sample| sample).map_err(with_advice)?;
+    let samples = png
+        .samples(|sample| sample)
+        .map_err(|problem| format!("{problem}; copy or export it again"))?;
     Ok(Decoded {
         height,
         width,

@@ -77,20 +77,18 @@ impl Likelihood {
         }
         // The standard deviation of the distribution with scale 1 is 1.8 at λ = 0.
         let log_scale = libm::log(deviation / 1.8);
-        let loss = |[shape, log_scale]: [f64; 2]| {
-            if !(SHAPES[0]..=SHAPES[1]).contains(&shape) {
-                return f64::INFINITY;
-            }
-            -self.log_likelihood(&self.residuals, [shape, log_scale]) / self.count
-        };
-        let search_from = |shape: f64| {
+        let [first, second] = [-0.1, 0.1].map(|shape| {
             let start = Start {
                 at: [shape, log_scale],
                 step: [0.05, 0.1],
             };
-            simplex::minimize(start, &loss)
-        };
-        let (first, second) = (search_from(-0.1), search_from(0.1));
+            simplex::minimize(start, &|at: [f64; 2]| {
+                if !(SHAPES[0]..=SHAPES[1]).contains(&at[0]) {
+                    return f64::INFINITY;
+                }
+                -self.log_likelihood(&self.residuals, at) / self.count
+            })
+        });
         let best = if first.1 <= second.1 {
             first.0
         } else {
@@ -109,26 +107,24 @@ impl Likelihood {
     /// Derivatives of the log-likelihood of some of the residuals with respect to λ and ln σ_TL.
     pub(super) fn score(&self, residuals: &Folded, [shape, log_scale]: [f64; 2]) -> [f64; 2] {
         let h = DERIVATIVE_STEP;
-        let slope = |[x, y]: [f64; 2]| {
+        [[h, 0.0], [0.0, h]].map(|[x, y]| {
             let up = self.log_likelihood(residuals, [shape + x, log_scale + y]);
             let down = self.log_likelihood(residuals, [shape - x, log_scale - y]);
             (up - down) / (2.0 * h)
-        };
-        [slope([h, 0.0]), slope([0.0, h])]
+        })
     }
 
     /// Second derivatives of the log-likelihood of all residuals.
     pub(super) fn curvature(&self, at: [f64; 2]) -> [[f64; 2]; 2] {
         let h = DERIVATIVE_STEP;
-        let slope = |x: f64, y: f64| self.score(&self.residuals, [at[0] + x, at[1] + y]);
-        let (right, left) = (slope(h, 0.0), slope(-h, 0.0));
-        let (up, down) = (slope(0.0, h), slope(0.0, -h));
-        let second = |high: f64, low: f64| (high - low) / (2.0 * h);
-        let mixed = 0.5 * (second(right[1], left[1]) + second(up[0], down[0]));
-        [
-            [second(right[0], left[0]), mixed],
-            [mixed, second(up[1], down[1])],
-        ]
+        // Second derivatives: the row is the variable of the first derivative, the column that of the second.
+        let [across, along] = [[h, 0.0], [0.0, h]].map(|[x, y]| {
+            let high = self.score(&self.residuals, [at[0] + x, at[1] + y]);
+            let low = self.score(&self.residuals, [at[0] - x, at[1] - y]);
+            [0, 1].map(|i| (high[i] - low[i]) / (2.0 * h))
+        });
+        let mixed = 0.5 * (across[1] + along[0]);
+        [[across[0], mixed], [mixed, along[1]]]
     }
 
     /// Log-likelihood of residuals. A code represents all values within ½ of it.

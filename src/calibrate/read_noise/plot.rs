@@ -23,14 +23,11 @@ pub(crate) struct PlotFit {
 pub(in super::super) fn plot_fit(residuals: &Residuals) -> PlotFit {
     let counts = residuals.counts();
     let total: f64 = counts.iter().map(|(_, count)| *count as f64).sum();
-    let mean = |power: i32| {
-        counts
-            .iter()
-            .map(|(steps, count)| *count as f64 * (*steps as f64 / STEPS as f64).powi(power))
-            .sum::<f64>()
-            / total.max(1.0)
-    };
-    let centre = mean(1);
+    let centre = counts
+        .iter()
+        .map(|(steps, count)| *count as f64 * (*steps as f64 / STEPS as f64))
+        .sum::<f64>()
+        / total.max(1.0);
     // Mean of the product of quantile and residual.
     let product = |shape: f64| {
         let (mut below, mut sum) = (0.0, 0.0);
@@ -43,8 +40,7 @@ pub(in super::super) fn plot_fit(residuals: &Residuals) -> PlotFit {
         }
         sum
     };
-    let correlation = |shape: f64| product(shape) / variance(shape).sqrt();
-    let shape = golden_section(SHAPES, &correlation);
+    let shape = golden_section(SHAPES, &|shape| product(shape) / variance(shape).sqrt());
     PlotFit {
         shape,
         scale: product(shape) / variance(shape),
@@ -53,7 +49,7 @@ pub(in super::super) fn plot_fit(residuals: &Residuals) -> PlotFit {
 
 /// Integral of the quantile function Q from 0 to u: Σ ±(u^(λ+1)) / (λ(λ + 1)) up to a constant.
 fn integral(u: f64, shape: f64) -> f64 {
-    let part = |u: f64| {
+    let [lower, upper] = [u, 1.0 - u].map(|u| {
         if u <= 0.0 {
             return 0.0;
         }
@@ -63,23 +59,25 @@ fn integral(u: f64, shape: f64) -> f64 {
         } else {
             u * libm::expm1(shape * log) / shape
         }
-    };
-    (part(u) + part(1.0 - u)) / (shape + 1.0)
+    });
+    (lower + upper) / (shape + 1.0)
 }
 
 /// Variance of the distribution with scale 1: 2/λ² · (1/(2λ + 1) − Γ(λ + 1)²/Γ(2λ + 2)), and π²/3 at λ = 0.
 fn variance(shape: f64) -> f64 {
-    let exact = |shape: f64| {
-        let gamma = 2.0 * libm::lgamma(shape + 1.0) - libm::lgamma(2.0 * shape + 2.0);
-        2.0 / (shape * shape) * (1.0 / (2.0 * shape + 1.0) - libm::exp(gamma))
-    };
     // Near 0 the difference suffers from cancellation; the variance is linear there, with a relative error of 10⁻⁶.
     let near = 1e-3;
     if shape.abs() >= near {
-        return exact(shape);
+        return exact_variance(shape);
     }
-    let [below, above] = [-near, near].map(exact);
+    let [below, above] = [-near, near].map(exact_variance);
     below + (above - below) * (shape + near) / (2.0 * near)
+}
+
+/// The variance for a shape that is not near 0.
+fn exact_variance(shape: f64) -> f64 {
+    let gamma = 2.0 * libm::lgamma(shape + 1.0) - libm::lgamma(2.0 * shape + 2.0);
+    2.0 / (shape * shape) * (1.0 / (2.0 * shape + 1.0) - libm::exp(gamma))
 }
 
 /// Finds the maximum of a unimodal function in a range by golden-section search; returns its argument.

@@ -33,11 +33,11 @@ pub(super) fn minimize(start: Start, function: &impl Fn([f64; 2]) -> f64) -> Ver
     for _ in 0..MAX_STEPS {
         simplex.sort_by(|a, b| a.1.total_cmp(&b.1));
         let [best, middle, worst] = simplex;
-        let extent = |i: usize| {
+        let extent = [0, 1].map(|i| {
             let sides = [middle.0[i] - best.0[i], worst.0[i] - best.0[i]];
             sides[0].abs().max(sides[1].abs())
-        };
-        if extent(0).max(extent(1)) < TOLERANCE {
+        });
+        if extent[0].max(extent[1]) < TOLERANCE {
             break;
         }
         let centroid: [f64; 2] = std::array::from_fn(|i| best.0[i].midpoint(middle.0[i]));
@@ -62,10 +62,10 @@ pub(super) fn minimize(start: Start, function: &impl Fn([f64; 2]) -> f64) -> Ver
             if contracted.1 < reflected.1.min(worst.1) {
                 contracted
             } else {
-                let shrunk =
-                    |at: [f64; 2]| evaluate(std::array::from_fn(|i| best.0[i].midpoint(at[i])));
-                simplex[1] = shrunk(middle.0);
-                shrunk(worst.0)
+                let shrunk = [middle.0, worst.0]
+                    .map(|at| evaluate(std::array::from_fn(|i| best.0[i].midpoint(at[i]))));
+                simplex[1] = shrunk[0];
+                shrunk[1]
             }
         };
     }
@@ -77,10 +77,13 @@ pub(super) fn minimize(start: Start, function: &impl Fn([f64; 2]) -> f64) -> Ver
 mod tests {
     use super::*;
 
+    /// Rosenbrock's valley. Its minimum, 0, is at (1, 1).
+    fn valley([x, y]: [f64; 2]) -> f64 {
+        (1.0 - x).powi(2) + 100.0 * (y - x * x).powi(2)
+    }
+
     #[test]
     fn finds_the_minimum_outside_excluded_points() {
-        // Rosenbrock's valley has its minimum, 0, at (1, 1).
-        let valley = |[x, y]: [f64; 2]| (1.0 - x).powi(2) + 100.0 * (y - x * x).powi(2);
         let start = Start {
             at: [-1.2, 1.0],
             step: [0.5, 0.5],
@@ -89,14 +92,13 @@ mod tests {
         assert!((x - 1.0).abs() < 1e-5 && (y - 1.0).abs() < 1e-5, "{x}, {y}");
         assert!(value < 1e-10);
         // With x > 0.5 excluded, the search ends at the boundary.
-        let walled = |[x, y]: [f64; 2]| {
-            if x > 0.5 {
+        let ([x, _], _) = minimize(start, &|at: [f64; 2]| {
+            if at[0] > 0.5 {
                 f64::INFINITY
             } else {
-                valley([x, y])
+                valley(at)
             }
-        };
-        let ([x, _], _) = minimize(start, &walled);
+        });
         assert!(x <= 0.5 && x > 0.49, "{x}");
     }
 }

@@ -18,8 +18,8 @@ pub(super) struct TukeyTable {
 
 impl TukeyTable {
     pub(super) fn new() -> Self {
-        let logits = (0..POINTS).map(|i| MIN_LOGIT * (1.0 - i as f64 / (POINTS - 1) as f64));
-        let logarithms: Vec<[f64; 2]> = logits
+        let logarithms: Vec<[f64; 2]> = (0..POINTS)
+            .map(|i| MIN_LOGIT * (1.0 - i as f64 / (POINTS - 1) as f64))
             // u = 1 / (1 + e^−t)
             .map(|t| [t - libm::log1p(libm::exp(t)), -libm::log1p(libm::exp(t))])
             .collect();

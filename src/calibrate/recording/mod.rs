@@ -26,9 +26,9 @@ impl Recording {
             folders::read(folder)?
         };
         recording.settings.sort_by(|a, b| {
-            let number = |setting: &SettingFiles| setting.number().unwrap_or(f64::INFINITY);
-            number(a)
-                .total_cmp(&number(b))
+            let [number, other] = [a, b].map(|setting| setting.number().unwrap_or(f64::INFINITY));
+            number
+                .total_cmp(&other)
                 .then_with(|| by_numbers(&a.name, &b.name))
         });
         for setting in &mut recording.settings {

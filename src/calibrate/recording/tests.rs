@@ -83,8 +83,8 @@ fn frames_are_ordered_by_number() {
     files.extend((0..2).map(|frame| format!("iso100/flat-10/{frame}.png")));
     let (_folder, recording) = opened(&files);
     let exposures = &recording.unwrap().settings[0].exposures;
-    let names = exposures.iter().map(|exposure| &*exposure.name);
-    assert_eq!(names.collect::<Vec<_>>(), ["1", "2", "3", "10"]);
+    let names: Vec<&str> = exposures.iter().map(|exposure| &*exposure.name).collect();
+    assert_eq!(names, ["1", "2", "3", "10"]);
     let frames: Vec<_> = exposures[1]
         .flats
         .iter()
@@ -134,16 +134,18 @@ fn odd_flats_and_unknown_names_are_noted() {
     assert!(exposures.iter().all(|exposure| exposure.dark.is_empty()));
 }
 
+/// The fewest files of a setting, except those with `part` in their names.
+fn least_without(part: &str) -> Vec<String> {
+    let mut files = least("iso100");
+    files.retain(|file| !file.contains(part));
+    files
+}
+
 #[test]
 fn too_few_frames_are_refused() {
-    let without = |part: &str| -> Vec<String> {
-        let mut files = least("iso100");
-        files.retain(|file| !file.contains(part));
-        files
-    };
     for (files, part) in [
-        (without("bias/0"), "1 bias frames and 3 exposures"),
-        (without("flat-2/1"), "2 bias frames and 2 exposures"),
+        (least_without("bias/0"), "1 bias frames and 3 exposures"),
+        (least_without("flat-2/1"), "2 bias frames and 2 exposures"),
         (vec!["a.png".to_owned()], "no folder of a setting in it"),
         (vec!["iso100/a.png".to_owned()], "no frames of a setting"),
     ] {

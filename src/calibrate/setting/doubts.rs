@@ -80,11 +80,9 @@ fn intercept_doubt(fit: &SettingFit, has_dark: bool) -> Option<String> {
 
 /// Warning if K differs between planes by more than [`MAX_PLANE_DIFFERENCE`].
 fn plane_doubt(fit: &SettingFit) -> Option<String> {
-    let gains = || fit.gain_by_plane.iter().flatten().copied();
-    let [low, high] = [
-        gains().fold(f64::INFINITY, f64::min),
-        gains().fold(0.0, f64::max),
-    ];
+    let gains = fit.gain_by_plane.iter().flatten().copied();
+    let low = gains.clone().fold(f64::INFINITY, f64::min);
+    let high = gains.fold(0.0, f64::max);
     if (high - low) / fit.gain.value > MAX_PLANE_DIFFERENCE {
         let list: Vec<String> = fit
             .gain_by_plane

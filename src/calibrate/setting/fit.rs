@@ -12,6 +12,12 @@ pub(crate) struct Measured {
     pub error: Option<f64>,
 }
 
+impl Measured {
+    pub(super) fn new(value: f64, error: Option<f64>) -> Self {
+        Self { value, error }
+    }
+}
+
 /// Noise of a sensor at one setting.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct SettingFit {

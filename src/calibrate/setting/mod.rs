@@ -82,7 +82,6 @@ fn fit(name: &str, bias: &BiasFit, flats: &Flats, base: Base<'_>) -> SettingFit 
     let points = flats.points(base, &vec![1.0; flats.pairs()]);
     let transfer = Transfer::fit(&points, base.offsets.len());
     let errors = Errors::estimate(bias, flats);
-    let measured = |value: f64, error: Option<f64>| Measured { value, error };
     let scale = bias.widened * libm::exp(bias.read.log_scale);
     SettingFit {
         name: name.to_owned(),
@@ -91,22 +90,22 @@ fn fit(name: &str, bias: &BiasFit, flats: &Flats, base: Base<'_>) -> SettingFit 
             exposures: flats.exposures(),
             flat_pairs: flats.pairs(),
         },
-        gain: measured(transfer.gain, errors.gain),
-        read_scale: measured(scale, errors.log_scale.map(|error| scale * error)),
-        read_shape: measured(bias.read.shape, errors.shape),
+        gain: Measured::new(transfer.gain, errors.gain),
+        read_scale: Measured::new(scale, errors.log_scale.map(|error| scale * error)),
+        read_shape: Measured::new(bias.read.shape, errors.shape),
         plot: bias.plot,
-        row_deviation: measured(noise.row_deviation(), errors.row),
+        row_deviation: Measured::new(noise.row_deviation(), errors.row),
         offsets: base
             .offsets
             .iter()
             .zip(&errors.offsets)
-            .map(|(offset, error)| measured(*offset, *error))
+            .map(|(offset, error)| Measured::new(*offset, *error))
             .collect(),
         read_deviation: noise.within.sqrt(),
         hot_pixels: bias.hot.count(),
         gain_by_plane: transfer.by_plane,
         bend: transfer.bend,
-        intercept: measured(transfer.intercept, Some(transfer.intercept_error)),
+        intercept: Measured::new(transfer.intercept, Some(transfer.intercept_error)),
         figure: FigurePoints {
             transfer: means_by_plane(&points),
             plot: plot_points(bias),
@@ -140,17 +139,18 @@ fn plot_points(bias: &BiasFit) -> Vec<[f64; 2]> {
     let scale = libm::exp(bias.read.log_scale);
     let mut counts = counts.into_iter();
     let (mut below, mut current) = (0.0, 0);
-    let point = |index: usize| {
-        let logit = reach * (2.0 * index as f64 / (PLOT_POINTS - 1) as f64 - 1.0);
-        let u = 1.0 / (1.0 + libm::exp(-logit));
-        while below <= u * total
-            && let Some((steps, count)) = counts.next()
-        {
-            below += count as f64;
-            current = steps;
-        }
-        let residual = current as f64 / STEPS as f64;
-        [tukey_lambda(u, bias.read.shape), residual / scale]
-    };
-    (0..PLOT_POINTS).map(point).collect()
+    (0..PLOT_POINTS)
+        .map(|index| {
+            let logit = reach * (2.0 * index as f64 / (PLOT_POINTS - 1) as f64 - 1.0);
+            let u = 1.0 / (1.0 + libm::exp(-logit));
+            while below <= u * total
+                && let Some((steps, count)) = counts.next()
+            {
+                below += count as f64;
+                current = steps;
+            }
+            let residual = current as f64 / STEPS as f64;
+            [tukey_lambda(u, bias.read.shape), residual / scale]
+        })
+        .collect()
 }

@@ -254,7 +254,6 @@ impl PairRow {
             *cell = Cell::new(&a[columns.clone()], &b[columns]);
         }
         row.neighbours = RowNeighbours::new(a, b);
-        let site = |column: usize| [a[column], b[column]];
         let mut last = None;
         for column in hot {
             let tile = (0..TILES).find(|tile| Layout::tile(a.len(), *tile).contains(&column));
@@ -267,7 +266,8 @@ impl PairRow {
             for left in column.saturating_sub(1)..=column {
                 let is_new = last.is_none_or(|last| left > last);
                 if is_new && left + 1 < a.len() {
-                    row.neighbours.remove(site(left), site(left + 1));
+                    row.neighbours
+                        .remove([a[left], b[left]], [a[left + 1], b[left + 1]]);
                     last = Some(left);
                 }
             }

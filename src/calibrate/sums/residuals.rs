@@ -146,22 +146,23 @@ impl Counter<'_> {
         }
     }
 
+    fn plane_mean(&self, plane_row: usize) -> f64 {
+        let [row, parity] = self.layout.place(plane_row);
+        self.plane_means[self.layout.cfa.plane(row, parity)]
+    }
+
     fn count_around_planes(&self, row: usize, part: &mut Vec<u16>, residuals: &mut Residuals) {
         let step = self.layout.cfa.step();
         let parts = row * step..(row + 1) * step;
-        let mean = |plane_row: usize| {
-            let [row, parity] = self.layout.place(plane_row);
-            self.plane_means[self.layout.cfa.plane(row, parity)]
-        };
         let (mut count, mut left) = (0.0, 0.0);
         for plane_row in parts.clone() {
             let [n, sum] = self.sums.rows()[plane_row];
             count += n as f64;
-            left += sum as f64 - n as f64 * mean(plane_row);
+            left += sum as f64 - n as f64 * self.plane_mean(plane_row);
         }
         let row_mean = if count > 0.0 { left / count } else { 0.0 };
         for plane_row in parts {
-            let centre = steps(mean(plane_row) + row_mean);
+            let centre = steps(self.plane_mean(plane_row) + row_mean);
             gather(self.layout, self.samples, plane_row, part);
             let mut hot = self.hot.columns(plane_row).peekable();
             for (column, code) in part.iter().enumerate() {

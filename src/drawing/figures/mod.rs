@@ -22,7 +22,7 @@ use crate::types::{AxisLevel, EnhancerName, Family, Variant, View};
 use darkqa_score::choice::ReadingMode;
 use darkqa_score::estimate::Estimate;
 use darkqa_score::findings::Findings;
-use darkqa_score::subject::{CHANCE, ModelInCondition, pooled_models};
+use darkqa_score::model_in_condition::{CHANCE, ModelInCondition, pooled_models};
 
 use mean::mean;
 pub(crate) use names::{KnownNames, Names};

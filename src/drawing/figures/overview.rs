@@ -7,7 +7,7 @@ use crate::drawing::chart::{Chart, LineContent, LineItems, LineStyle, Panel, Plo
 use crate::types::degradations::{Axis, Kind};
 use crate::types::{AxisLevel, EnhancerName, Variant};
 use darkqa_score::findings::Findings;
-use darkqa_score::subject::CHANCE;
+use darkqa_score::model_in_condition::CHANCE;
 
 /// A chart with its caption, or the reason why there is none.
 pub(crate) type PanelChart = Result<(String, Chart), &'static str>;

@@ -5,7 +5,7 @@ use crate::drawing::chart::{LineContent, LineItems, LineStyle, PlotLine};
 use crate::text::words::light;
 use crate::types::{EnhancerName, Variant};
 use darkqa_score::findings::Findings;
-use darkqa_score::subject::CHANCE;
+use darkqa_score::model_in_condition::CHANCE;
 
 /// Accuracy by level in one variant: each model raw and with each enhancer.
 #[derive(Debug, Clone)]

@@ -7,8 +7,8 @@ use crate::drawing::figures::FigureSpec;
 use darkqa_score::choice::ReadingMode;
 use darkqa_score::comparisons::ComparisonKind;
 use darkqa_score::findings::Findings;
+use darkqa_score::model_in_condition::ModelInCondition;
 use darkqa_score::photographs::pair_darkness::PairDarkness;
-use darkqa_score::subject::ModelInCondition;
 
 /// Accuracy of each model at L0, on photographs in the dark, on synthetic images that are as dark, and on enhanced photographs; `None` if
 /// no scene was photographed in the dark.

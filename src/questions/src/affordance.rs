@@ -15,13 +15,15 @@ pub(super) fn candidates(context: &RuleContext<'_>) -> Vec<RuleResult> {
         .activity
         .iter()
         .flat_map(|activity| {
-            let reject = |answer, reason| {
-                rejected(Family::Affordance, &activity.activity, Some(answer), reason)
-            };
             [
-                suitable(context, activity).unwrap_or_else(|reason| reject(true, reason)),
-                unsuitable(context, activity).unwrap_or_else(|reason| reject(false, reason)),
+                (true, suitable(context, activity)),
+                (false, unsuitable(context, activity)),
             ]
+            .map(|(answer, result)| {
+                result.unwrap_or_else(|reason| {
+                    rejected(Family::Affordance, &activity.activity, Some(answer), reason)
+                })
+            })
         })
         .collect()
 }
@@ -38,15 +40,14 @@ fn suitable(context: &RuleContext<'_>, activity: &ActivityRule) -> Result<RuleRe
         return Err(Reason::Inexpressible);
     }
     let evidence: Vec<&Segment> = context.statistics.evidence(context.book).collect();
-    let find_segment = |token: &String| {
-        evidence
-            .iter()
-            .find(|segment| segment.token(context.book) == token && is_typical(context, segment))
-    };
     let found = activity.enablers.iter().find_map(|tokens| {
         tokens
             .iter()
-            .map(|token| find_segment(token).copied())
+            .map(|token| {
+                evidence.iter().copied().find(|segment| {
+                    segment.token(context.book) == token && is_typical(context, segment)
+                })
+            })
             .collect::<Option<Vec<&Segment>>>()
     });
     let Some(segments) = found else {

@@ -89,9 +89,11 @@ fn edges(image: &Rgb) -> f64 {
     let mut steep = 0_usize;
     for y in 0..height {
         for x in 0..width {
-            let side = |right| at(y, x, 0, right) + 2.0 * at(y, x, 1, right) + at(y, x, 2, right);
-            let row = |down| at(y, x, down, 0) + 2.0 * at(y, x, down, 1) + at(y, x, down, 2);
-            let (across, along) = (side(2) - side(0), row(2) - row(0));
+            let [left, right] =
+                [0, 2].map(|dx| at(y, x, 0, dx) + 2.0 * at(y, x, 1, dx) + at(y, x, 2, dx));
+            let [above, below] =
+                [0, 2].map(|dy| at(y, x, dy, 0) + 2.0 * at(y, x, dy, 1) + at(y, x, dy, 2));
+            let (across, along) = (right - left, below - above);
             steep +=
                 usize::from((across * across + along * along).sqrt() / 8.0 >= MIN_EDGE_GRADIENT);
         }
@@ -172,14 +174,10 @@ mod tests {
 
     #[test]
     fn light_is_measured_in_ev_below_white() {
-        let ev = |code: u8| {
-            let codes = [[code; 3]; 5];
-            mean_light(&codes).log2()
-        };
-        assert!(ev(255).abs() < 1e-6);
-        // Code 188 is half of the light of white.
-        assert!((ev(188) + 1.0).abs() < 0.01, "{}", ev(188));
-        assert!(ev(0).is_finite());
+        let [white, half, black] = [255, 188, 0].map(|code: u8| mean_light(&[[code; 3]; 5]).log2());
+        assert!(white.abs() < 1e-6);
+        assert!((half + 1.0).abs() < 0.01, "{half}");
+        assert!(black.is_finite());
     }
 
     #[test]
@@ -195,15 +193,12 @@ mod tests {
 
     #[test]
     fn a_large_picture_has_the_edges_of_the_small_one() {
-        let bars = |x: usize, width: usize| {
-            if (x / width).is_multiple_of(2) {
-                40
-            } else {
-                200
-            }
-        };
-        let small = edges(&image(480, 640, |_, x| bars(x, 16)));
-        let large = edges(&image(960, 1280, |_, x| bars(x, 32)));
+        let [small, large] = [1, 2].map(|scale| {
+            let bars = image(480 * scale, 640 * scale, |_, x| {
+                [40, 200][x / (16 * scale) % 2]
+            });
+            edges(&bars)
+        });
         assert!(
             (small - large).abs() < 1e-9 && small > 0.1,
             "{small} {large}"

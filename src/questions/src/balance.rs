@@ -55,9 +55,9 @@ pub(super) fn balance(
     }
     if mode != BalanceMode::None {
         for (_, list) in groups(&asked, &dropped, binary_key) {
-            let (yes, no): (Vec<usize>, Vec<usize>) = list
+            let (yes, no) = list
                 .into_iter()
-                .partition(|i| asked[*i].question.choices.truth() == Some(0));
+                .partition::<Vec<_>, _>(|i| asked[*i].question.choices.truth() == Some(0));
             let max = yes.len().min(no.len()) + 1;
             dropped.extend(yes.into_iter().skip(max));
             dropped.extend(no.into_iter().skip(max));
@@ -101,17 +101,15 @@ fn cap_shares(
         (Family::RoomType, rule.room_type_share_ppm),
         (Family::Color, rule.color_share_ppm),
     ] {
-        let answer = |asked: &GeneratedQuestion| {
+        let lists = groups(asked, dropped, |asked| {
             (asked.question.family == family).then(|| asked.answer().to_owned())
-        };
-        let lists = groups(asked, dropped, answer);
+        });
         match max_per_answer(&lists, share) {
-            Some(max) => {
-                let surplus = lists
+            Some(max) => dropped.extend(
+                lists
                     .into_values()
-                    .flat_map(|list| list.into_iter().skip(max));
-                dropped.extend(surplus);
-            }
+                    .flat_map(|list| list.into_iter().skip(max)),
+            ),
             None if lists.is_empty() => {}
             None => uneven.push(format!(
                 "{family}: too few different answers ({}) to limit each to {} % of the questions",
@@ -144,11 +142,13 @@ fn groups<K: Ord>(
 /// Maximum number of questions with the same answer that keeps every answer within its share of all. `None` with too few different answers.
 fn max_per_answer(lists: &BTreeMap<String, Vec<usize>>, share_ppm: u64) -> Option<usize> {
     let total: usize = lists.values().map(Vec::len).sum();
-    let remaining = |max: usize| -> usize { lists.values().map(|list| list.len().min(max)).sum() };
     (1..=total)
         .rev()
         .map(|all| (all, (all as u64 * share_ppm / 1_000_000) as usize))
-        .find(|(all, max)| *max > 0 && remaining(*max) >= *all)
+        .find(|(all, max)| {
+            let remaining: usize = lists.values().map(|list| list.len().min(*max)).sum();
+            *max > 0 && remaining >= *all
+        })
         .map(|(_, max)| max)
 }
 
@@ -217,14 +217,22 @@ mod tests {
             .count()
     }
 
+    fn chairs_and_beds(family: &Family) -> Vec<GeneratedQuestion> {
+        (0..12)
+            .map(|i| {
+                let thing = if i < 9 { "chair" } else { "bed" };
+                asked(i, family.clone(), thing, usize::from(i >= 7))
+            })
+            .collect()
+    }
+
     #[test]
     fn yes_and_no_differ_by_at_most_one() {
-        let list = |family: &Family| {
-            let chairs = (0..9).map(|i| asked(i, family.clone(), "chair", usize::from(i >= 7)));
-            let beds = (9..12).map(|i| asked(i, family.clone(), "bed", 1));
-            chairs.chain(beds).collect::<Vec<_>>()
-        };
-        let balanced = balance(list(&Family::Presence), BalanceMode::Binary, &rule());
+        let balanced = balance(
+            chairs_and_beds(&Family::Presence),
+            BalanceMode::Binary,
+            &rule(),
+        );
         assert_eq!(
             (
                 count(&balanced.asked, "chair", "yes"),
@@ -233,7 +241,7 @@ mod tests {
             (3, 2)
         );
         assert_eq!((balanced.asked.len(), balanced.dropped.len()), (6, 6));
-        let mut reversed = list(&Family::Presence);
+        let mut reversed = chairs_and_beds(&Family::Presence);
         reversed.reverse();
         let mut other = balance(reversed, BalanceMode::Binary, &rule()).asked;
         other.reverse();
@@ -242,7 +250,8 @@ mod tests {
             (Family::Presence, BalanceMode::None),
             (Family::Color, BalanceMode::Binary),
         ] {
-            assert_eq!(balance(list(&family), mode, &rule()).asked.len(), 12);
+            let balanced = balance(chairs_and_beds(&family), mode, &rule());
+            assert_eq!(balanced.asked.len(), 12);
         }
     }
 

@@ -153,6 +153,10 @@ fn check_gap(
     }
 }
 
+fn is_background_class(book: &RuleBook, class: &str) -> bool {
+    book.has_flag(class, ClassFlag::Structural) || book.has_flag(class, ClassFlag::Flat)
+}
+
 /// Checks the objects that are not among the choices: none may have a smaller median depth than `second`, or a smaller 10 % quantile than
 /// `nearest`, both in millimetres.
 fn check_rivals(
@@ -162,12 +166,9 @@ fn check_rivals(
     second: u32,
 ) -> Result<(), Reason> {
     let (book, statistics) = (context.book, context.statistics);
-    let is_background_class = |class: &str| {
-        book.has_flag(class, ClassFlag::Structural) || book.has_flag(class, ClassFlag::Flat)
-    };
     for segment in &statistics.segments {
         // A segment of several classes may be any object.
-        let is_background = (is_background_class(&segment.class) || segment.is_flat(book))
+        let is_background = (is_background_class(book, &segment.class) || segment.is_flat(book))
             && !segment.is_mixed(book);
         if is_background || objects.iter().any(|object| object.segment.id == segment.id) {
             continue;
@@ -187,7 +188,7 @@ fn check_rivals(
     let loose: u64 = statistics
         .loose
         .iter()
-        .filter(|(class, _)| !is_background_class(class))
+        .filter(|(class, _)| !is_background_class(book, class))
         .map(|(_, pixels)| pixels)
         .sum();
     if statistics.ppm(loose) >= book.closest.rival_ppm {

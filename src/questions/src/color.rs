@@ -52,12 +52,12 @@ fn candidate(
     }
     let (choices, truth) = choices(context, color).ok_or(Reason::NotOffered)?;
     let (_, most, next, none) = segment.leading_color();
-    let share = |part| ppm(part, segment.core);
+    let [most, next, none] = [most, next, none].map(|part| ppm(part, segment.core));
     let evidence = json!({
         "core_px": segment.core,
-        "dominant_ppm": share(most),
-        "second_ppm": share(next),
-        "nameless_ppm": share(none),
+        "dominant_ppm": most,
+        "second_ppm": next,
+        "nameless_ppm": none,
         "median_rgb": segment.median,
         "light_rgb": context.statistics.light,
         "around_luma": segment.around,
@@ -139,14 +139,13 @@ fn choices(context: &RuleContext<'_>, truth: Color) -> Option<(Vec<String>, usiz
         ColorChoices::All11 => Color::ALL.to_vec(),
         ColorChoices::Fixed8 => rule.fixed8.clone(),
         ColorChoices::K5 => {
-            let is_neighbour = |color: Color| {
-                rule.neighbours
-                    .iter()
-                    .any(|pair| *pair == [color, truth] || *pair == [truth, color])
-            };
             let mut others: Vec<Color> = Color::ALL
                 .into_iter()
-                .filter(|color| *color != truth && !is_neighbour(*color))
+                .filter(|color| *color != truth)
+                .filter(|color| {
+                    !rule.neighbours.contains(&[*color, truth])
+                        && !rule.neighbours.contains(&[truth, *color])
+                })
                 .collect();
             context.picker.shuffle("color", &mut others);
             others.truncate(4);

@@ -149,9 +149,9 @@ impl Palette {
 
     /// Bin of a colour, from 0 to 11.
     #[must_use]
-    pub fn bin(&self, [red, green, blue]: [u8; 3]) -> usize {
-        let block = |channel: u8| usize::from(channel >> 3);
-        self.bins[(block(red) * SIDE + block(green)) * SIDE + block(blue)].into()
+    pub fn bin(&self, rgb: [u8; 3]) -> usize {
+        let [red, green, blue] = rgb.map(|channel| usize::from(channel >> 3));
+        self.bins[(red * SIDE + green) * SIDE + blue].into()
     }
 
     /// Name of a colour; `None` if people do not agree on one.

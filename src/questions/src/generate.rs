@@ -119,9 +119,9 @@ pub fn generate(
     let mut frames: Vec<&FrameStatistics> = frames.iter().collect();
     frames.sort_by(|a, b| (&a.scene, &a.frame).cmp(&(&b.scene, &b.frame)));
     let mut generated = Generated::default();
-    let (dark, light): (Vec<_>, Vec<_>) = frames
+    let (dark, light) = frames
         .into_iter()
-        .partition(|frame| frame.luma[1] < book.measure.dark_luma);
+        .partition::<Vec<_>, _>(|frame| frame.luma[1] < book.measure.dark_luma);
     generated.dark = dark.iter().map(|frame| frame.frame.clone()).collect();
 
     let mut frequency = Frequency::default();
@@ -278,9 +278,9 @@ impl AnswerCounts {
             return candidates.into_iter().nth(chosen);
         }
         let answer = context.picker.pick(family.name(), "polarity", 2);
-        let (wanted, others): (Vec<Candidate>, Vec<Candidate>) = candidates
+        let (wanted, others) = candidates
             .into_iter()
-            .partition(|candidate| candidate.truth == answer);
+            .partition::<Vec<_>, _>(|candidate| candidate.truth == answer);
         let eligible = if wanted.is_empty() { others } else { wanted };
         let chosen = eligible.into_iter().min_by_key(|candidate| {
             let counts = self.0.get(&(family.clone(), candidate.text.clone()));

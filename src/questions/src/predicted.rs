@@ -139,20 +139,21 @@ impl PredictedFrame {
     /// Index of the choice whose nearest segment has the smallest median distance; `None` unless at least two of the offered things are
     /// found.
     fn closest(&self, choices: &[String], rules: &Rules) -> Option<usize> {
-        let distance = |word: &String| {
-            let (class, _) = rules
-                .book()
-                .class
-                .iter()
-                .find(|(_, rule)| rule.words.contains(word))?;
-            self.segments(class)
-                .filter_map(|segment| Some(segment.depth?.median))
-                .min()
-        };
         let found: Vec<(u32, usize)> = choices
             .iter()
             .enumerate()
-            .filter_map(|(choice, word)| Some((distance(word)?, choice)))
+            .filter_map(|(choice, word)| {
+                let (class, _) = rules
+                    .book()
+                    .class
+                    .iter()
+                    .find(|(_, rule)| rule.words.contains(word))?;
+                let nearest = self
+                    .segments(class)
+                    .filter_map(|segment| Some(segment.depth?.median))
+                    .min()?;
+                Some((nearest, choice))
+            })
             .collect();
         let (_, nearest) = found.iter().min()?;
         (found.len() > 1).then_some(*nearest)

@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 
 /// Linear light of each sRGB code in 65,535ths (IEC 61966-2-1), rounded.
 static LINEAR: LazyLock<[u64; 256]> = LazyLock::new(|| {
-    let linear = |code: usize| {
+    std::array::from_fn(|code| {
         let value = code as f64 / 255.0;
         let light = if value > 0.04045 {
             libm::pow((value + 0.055) / 1.055, 2.4)
@@ -12,8 +12,7 @@ static LINEAR: LazyLock<[u64; 256]> = LazyLock::new(|| {
             value / 12.92
         };
         (light * 65_535.0).round() as u64
-    };
-    std::array::from_fn(linear)
+    })
 });
 
 /// Returns the code that a surface would have if light with code `light` were white: the nearest code of the linear light of `code` divided

@@ -155,27 +155,25 @@ impl<'a> Evidence<'a> {
     /// True if the second room is seen through a door: its segments are small and all far behind the first's.
     fn is_behind(&self, first: &[u32], second: &[u32]) -> bool {
         let rule = &self.book.doorway;
-        let listed = |ids: &[u32]| -> Vec<&Segment> {
+        let lists = [first, second].map(|ids| {
             self.statistics
                 .segments
                 .iter()
                 .filter(|segment| ids.contains(&segment.id))
+        });
+        let [first_area, second_area]: [u64; 2] = lists
+            .clone()
+            .map(|list| list.map(|segment| segment.area).sum());
+        let [near, far]: [Option<Vec<u64>>; 2] = lists.map(|list| {
+            list.map(|segment| Some(segment.reliable_depth(self.book)?.median.into()))
                 .collect()
-        };
-        let (first, second) = (listed(first), listed(second));
-        let area = |list: &[&Segment]| -> u64 { list.iter().map(|segment| segment.area).sum() };
-        let medians = |list: &[&Segment]| -> Option<Vec<u64>> {
-            list.iter()
-                .map(|segment| Some(segment.reliable_depth(self.book)?.median.into()))
-                .collect()
-        };
-        let (Some(near), Some(far)) = (medians(&first), medians(&second)) else {
+        });
+        let near = near.and_then(|depths| depths.into_iter().max());
+        let far = far.and_then(|depths| depths.into_iter().min());
+        let (Some(near), Some(far)) = (near, far) else {
             return false;
         };
-        let (Some(near), Some(far)) = (near.into_iter().max(), far.into_iter().min()) else {
-            return false;
-        };
-        area(&first) >= rule.area_ratio * area(&second)
+        first_area >= rule.area_ratio * second_area
             && far * 1_000_000 >= near * rule.depth_ratio_ppm
     }
 }
@@ -187,26 +185,23 @@ fn find_winner(
     segments: &BTreeMap<String, Vec<u32>>,
 ) -> Result<String, NoRoom> {
     let rule = &evidence.book.room;
-    let position = |room: &str| {
-        rule.order
-            .iter()
-            .position(|other| other == room)
-            .unwrap_or(usize::MAX)
-    };
     let mut ranked: Vec<(&String, u32)> =
         scores.iter().map(|(room, score)| (room, *score)).collect();
-    ranked.sort_by_key(|(room, score)| (std::cmp::Reverse(*score), position(room), *room));
+    ranked.sort_by_key(|(room, score)| {
+        let position = rule.order.iter().position(|other| other == *room);
+        let position = position.unwrap_or(usize::MAX);
+        (std::cmp::Reverse(*score), position, *room)
+    });
     let Some(&(first, score)) = ranked.first() else {
         return Err(NoRoom::NoSigns);
     };
     if score < rule.least_score {
         return Err(NoRoom::Weak);
     }
-    let is_rival = |other: u32| other >= rule.least_score || score - other < rule.least_lead;
     let rivals: Vec<(&String, u32)> = ranked[1..]
         .iter()
         .copied()
-        .filter(|(_, other)| is_rival(*other))
+        .filter(|(_, other)| *other >= rule.least_score || score - other < rule.least_lead)
         .collect();
     let [(second, other)] = rivals[..] else {
         return if rivals.is_empty() {
@@ -224,10 +219,11 @@ fn find_winner(
             }
         }
     }
-    let own = |room: &str| segments.get(room).map_or(&[][..], Vec::as_slice);
-    if evidence.is_behind(own(first), own(second)) {
+    let [first_ids, second_ids] =
+        [first, second].map(|room| segments.get(room).map_or(&[][..], Vec::as_slice));
+    if evidence.is_behind(first_ids, second_ids) {
         Ok(first.clone())
-    } else if score == other && evidence.is_behind(own(second), own(first)) {
+    } else if score == other && evidence.is_behind(second_ids, first_ids) {
         Ok(second.clone())
     } else {
         Err(NoRoom::Contested)

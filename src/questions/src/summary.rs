@@ -205,13 +205,18 @@ impl QuestionSummary {
 
 impl CandidateCounts {
     fn new(counts: &FamilyCounts) -> Self {
-        let omitted = |reason| counts.omitted.get(&reason).copied().unwrap_or(0);
+        let [not_chosen, rejected, unbalanced] = [
+            OmissionReason::NotChosen,
+            OmissionReason::Rejected,
+            OmissionReason::Unbalanced,
+        ]
+        .map(|reason| counts.omitted.get(&reason).copied().unwrap_or(0));
         Self {
             viable: counts.viable,
             asked: counts.asked,
-            not_chosen: omitted(OmissionReason::NotChosen),
-            rejected: omitted(OmissionReason::Rejected),
-            unbalanced: omitted(OmissionReason::Unbalanced),
+            not_chosen,
+            rejected,
+            unbalanced,
             rejections: counts.rejections.clone(),
         }
     }
@@ -344,28 +349,26 @@ fn prior(list: &[&GeneratedQuestion]) -> f64 {
             *scenes.entry(&asked.scene).or_insert(0) += 1;
         }
     }
-    let most_common = |text: &str, except: &str| {
-        counts
-            .get(text)
-            .into_iter()
-            .flatten()
-            .map(|(answer, scenes)| {
-                let count: usize = scenes
-                    .iter()
-                    .filter(|(scene, _)| **scene != except)
-                    .map(|(_, count)| count)
-                    .sum();
-                (*answer, count)
-            })
-            .filter(|(_, count)| *count > 0)
-            .min_by_key(|&(answer, count)| (std::cmp::Reverse(count), answer))
-            .map(|(answer, _)| answer)
-    };
     let (mut right, mut guesses) = (0_usize, BTreeMap::<usize, usize>::new());
     for asked in list {
-        match most_common(&asked.question.text, &asked.scene)
-            .or_else(|| most_common("", &asked.scene))
-        {
+        let most_common = [&*asked.question.text, ""].into_iter().find_map(|text| {
+            counts
+                .get(text)
+                .into_iter()
+                .flatten()
+                .map(|(answer, scenes)| {
+                    let count: usize = scenes
+                        .iter()
+                        .filter(|(scene, _)| **scene != asked.scene)
+                        .map(|(_, count)| count)
+                        .sum();
+                    (*answer, count)
+                })
+                .filter(|(_, count)| *count > 0)
+                .min_by_key(|&(answer, count)| (std::cmp::Reverse(count), answer))
+                .map(|(answer, _)| answer)
+        });
+        match most_common {
             Some(answer) => right += usize::from(answer == asked.answer()),
             None => *guesses.entry(asked.question.choices.len()).or_insert(0) += 1,
         }

@@ -22,12 +22,15 @@ impl Vocabulary {
     /// Collects the words of these frames and labels.
     pub fn new(frames: &[FrameStatistics], labels: &Labels, book: &RuleBook) -> Self {
         let mut vocabulary = Self::default();
-        let segments = || frames.iter().flat_map(|frame| &frame.segments);
-        for segment in segments().filter(|segment| segment.source != WordSource::Coarse) {
-            vocabulary.add(&segment.class, &segment.word, book);
+        let mut has_names = false;
+        for segment in frames.iter().flat_map(|frame| &frame.segments) {
+            if segment.source != WordSource::Coarse {
+                vocabulary.add(&segment.class, &segment.word, book);
+            }
+            has_names |= segment.source == WordSource::Name;
         }
         // If segments have names, the labels are coarse classes and do not name objects.
-        if !segments().any(|segment| segment.source == WordSource::Name) {
+        if !has_names {
             for label in labels.labels.values() {
                 let (word, _) = plain_word(&label.name);
                 if book.coarse.identifies_object(&labels.space, &word) {

@@ -9,8 +9,8 @@ use crate::error::Result;
 use crate::text::ladder::{Ladder, Series, SeriesByLevel};
 use crate::text::words::counted;
 use crate::types::AxisLevel;
+use darkqa_score::model_in_condition::ModelInCondition;
 use darkqa_score::open::{Group, OpenCell};
-use darkqa_score::subject::ModelInCondition;
 
 /// Draws a chart of all questions and a chart with a panel for each category. Empty if the run has fewer than two levels.
 pub(super) fn figures(report: &OpenReport<'_>) -> Result<Vec<Figure>> {

@@ -10,8 +10,8 @@ use crate::report::page::data::{
 };
 use crate::text::words;
 use crate::types::{AxisLevel, View};
+use darkqa_score::model_in_condition;
 use darkqa_score::open::{AnswerOutcome, Group};
-use darkqa_score::subject;
 
 /// Reasons why an answer has no mark. `why` has indices into this list, which failures of answers extend.
 const REASONS: [&str; 3] = ["", "the judge’s reply has no mark", "no judge was asked"];
@@ -21,7 +21,7 @@ const REASONS: [&str; 3] = ["", "the judge’s reply has no mark", "no judge was
 /// # Errors
 /// If the data cannot be serialized.
 pub(super) fn packed(report: &OpenReport<'_>) -> Result<String> {
-    let subjects: Vec<&subject::ModelInCondition> = report
+    let subjects: Vec<&model_in_condition::ModelInCondition> = report
         .summary
         .cells
         .iter()
@@ -48,7 +48,7 @@ struct Results<'a> {
 
 fn data<'a>(
     report: &'a OpenReport<'_>,
-    subjects: &[&'a subject::ModelInCondition],
+    subjects: &[&'a model_in_condition::ModelInCondition],
     limit: SizeLimit,
 ) -> PageData<'a> {
     let (mut frames, mut families) = (Distinct::new(), Distinct::new());
@@ -100,11 +100,11 @@ fn data<'a>(
 
 /// A subject as the script needs it, with the index of the same model at L0.
 fn subject_data<'a>(
-    subject: &'a subject::ModelInCondition,
-    all: &[&subject::ModelInCondition],
+    subject: &'a model_in_condition::ModelInCondition,
+    all: &[&model_in_condition::ModelInCondition],
 ) -> ModelInCondition<'a> {
     let clean = subject.level.and_then(|_| {
-        let clean = subject::ModelInCondition::with_images(
+        let clean = model_in_condition::ModelInCondition::with_images(
             &subject.model,
             AxisLevel::L0,
             &subject.variant,
@@ -132,8 +132,11 @@ fn subject_data<'a>(
 }
 
 /// Answers by subject, with one item for each question; if several people answered a question, each answer is an item of its own.
-fn results<'a>(report: &'a OpenReport<'_>, subjects: &[&subject::ModelInCondition]) -> Results<'a> {
-    let indices: BTreeMap<&subject::ModelInCondition, usize> =
+fn results<'a>(
+    report: &'a OpenReport<'_>,
+    subjects: &[&model_in_condition::ModelInCondition],
+) -> Results<'a> {
+    let indices: BTreeMap<&model_in_condition::ModelInCondition, usize> =
         subjects.iter().copied().zip(0..).collect();
     let mut cells =
         vec![vec![Vec::<&ReportedAnswer>::new(); subjects.len()]; report.questions.len()];

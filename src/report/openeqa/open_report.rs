@@ -6,8 +6,8 @@ use crate::text::noise_profiles::NoiseProfiles;
 use crate::types::manifests::RunManifest;
 use crate::types::{RunQuestion, Thumbnail};
 use darkqa_score::choice::llm_match::Protocol;
+use darkqa_score::model_in_condition::ModelInCondition;
 use darkqa_score::open::{AnswerOutcome, OpenSummary};
-use darkqa_score::subject::ModelInCondition;
 
 /// All data of a report on open questions.
 #[derive(Debug, Clone)]

@@ -13,8 +13,8 @@ use crate::tables::Section;
 use crate::text::table::Table;
 use crate::text::words::{counted, percent, points};
 use crate::types::degradations::Axis;
+use darkqa_score::model_in_condition::ModelInCondition;
 use darkqa_score::open::{AnswerOutcome, Baseline, Group};
-use darkqa_score::subject::ModelInCondition;
 
 /// Sections of the page before the items.
 const SECTIONS: [Section; 1] = [(SECTION, "Scores", "", &["scores", "categories"])];

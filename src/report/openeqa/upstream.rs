@@ -6,8 +6,8 @@ use serde::Serialize;
 
 use super::open_report::{OpenReport, ReportedAnswer};
 use crate::error::{Error, Result};
+use darkqa_score::model_in_condition::ModelInCondition;
 use darkqa_score::open::AnswerOutcome;
-use darkqa_score::subject::ModelInCondition;
 
 /// Folder of these files in a run.
 const FOLDER: &str = "upstream";

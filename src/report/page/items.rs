@@ -159,10 +159,10 @@ fn subjects<'a>(grid: &'a Grid<'_>) -> Vec<ModelInCondition<'a>> {
 /// Index of the same model at L0 without an enhancer; `None` for models without images.
 fn clean_index(
     grid: &Grid<'_>,
-    subject: &darkqa_score::subject::ModelInCondition,
+    subject: &darkqa_score::model_in_condition::ModelInCondition,
 ) -> Option<usize> {
     subject.level?;
-    let clean = darkqa_score::subject::ModelInCondition::with_images(
+    let clean = darkqa_score::model_in_condition::ModelInCondition::with_images(
         &subject.model,
         AxisLevel::L0,
         &subject.variant,

@@ -38,7 +38,7 @@ use crate::types::flags::setting_spelling;
 use crate::types::manifests::RunManifest;
 use darkqa_score::answers::confusion::Confusion;
 use darkqa_score::grid::Grid;
-use darkqa_score::subject::models_under_test;
+use darkqa_score::model_in_condition::models_under_test;
 
 /// Template of the page.
 const PAGE: &str = include_str!("page.html");

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use crate::types::{AxisLevel, Digest, Family};
 use darkqa_score::choice::ReadingMode;
 use darkqa_score::grid::Grid;
-use darkqa_score::subject::ModelInCondition;
+use darkqa_score::model_in_condition::ModelInCondition;
 
 /// Maximum number of replies on a page (chosen): they fit on a page of 12 MB, and a browser loads them in two seconds.
 const MAX_REPLIES: usize = 200_000;

@@ -10,7 +10,7 @@ use crate::text::words::light;
 use crate::types::{Axis, AxisLevel, EnhancerName, FrameId, Thumbnail, Variant};
 use darkqa_score::choice::ReadingMode;
 use darkqa_score::grid::{Grid, TrialResult};
-use darkqa_score::subject::{ModelInCondition, pooled_models};
+use darkqa_score::model_in_condition::{ModelInCondition, pooled_models};
 
 /// Maximum number of models whose answers are below an image (chosen to fit one screen).
 const MAX_MODELS: usize = 3;

@@ -55,7 +55,7 @@ pub(crate) fn pairs(pairs: &[&PairComparison]) -> Result<Vec<u8>> {
             row.noise.map(|noise| noise.clean_psnr)
         })
         .column(Text, "csv reading", |row| {
-            let reading = row.noise.map(|noise| noise.method.reading.to_string());
+            let reading = row.noise.map(|noise| noise.method.profile.to_string());
             reading.unwrap_or_default()
         })
         .column(Text, "csv camera", |row| {
@@ -92,7 +92,7 @@ pub(crate) fn by_code(residuals: &PooledResiduals) -> Result<Vec<u8>> {
         .column(Number, "csv noise_mean", |(.., (.., noise))| noise[0])
         .column(Number, "csv noise_std", |(.., (.., noise))| noise[1])
         .column(Text, "csv reading", |(method, ..)| {
-            method.reading.to_string()
+            method.profile.to_string()
         })
         .column(Text, "csv camera", |(method, ..)| method.camera.word())
         .build();
@@ -160,8 +160,8 @@ pub(crate) fn crops<'a>(pairs: impl Iterator<Item = (&'a PairComparison, &'a [Rg
     for noise in pairs.iter().take(1).flat_map(|(pair, _)| &pair.noise) {
         // A column has space for 36 letters.
         columns.push(match noise.method.camera {
-            CameraOrigin::Given => format!("with noise, {}", noise.method.reading),
-            _ => format!("with noise, {}, fitted", noise.method.reading),
+            CameraOrigin::Given => format!("with noise, {}", noise.method.profile),
+            _ => format!("with noise, {}, fitted", noise.method.profile),
         });
     }
     let columns: Vec<&str> = columns.iter().map(String::as_str).collect();

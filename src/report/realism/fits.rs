@@ -5,7 +5,7 @@ use crate::text::csv;
 use crate::text::table::ColumnKind::{Number, Text};
 use crate::text::table::TableBuilder;
 use crate::text::terminal;
-use darkqa_score::photographs::realism::gain::{FitOutcome, PairFit, PooledGain, ReadingFit};
+use darkqa_score::photographs::realism::gain::{FitOutcome, PairFit, PooledGain, ProfileFit};
 use darkqa_score::photographs::realism::mean::Mean;
 
 /// Remark on the gain of a saved image, printed with every gain.
@@ -13,9 +13,9 @@ pub(crate) const AS_SAVED: &str =
     "as saved; a smaller K than the sensor's means that noise was averaged away";
 
 /// Table of the gains over pairs, with a row for each noise profile.
-pub(super) fn table(fits: &[ReadingFit]) -> String {
+pub(super) fn table(fits: &[ProfileFit]) -> String {
     let table = TableBuilder::new("fits", fits)
-        .column(Text, "terminal", |fit| fit.reading.to_string())
+        .column(Text, "terminal", |fit| fit.profile.to_string())
         .column(Text, "terminal K", |fit| {
             fit.pooled.as_ref().map(|gains| mean_text(fit, gains, 1.0))
         })
@@ -39,7 +39,7 @@ pub(super) fn table(fits: &[ReadingFit]) -> String {
 }
 
 /// Geometric mean of K times a factor, with its interval; a list of all values if they are too few for an interval.
-fn mean_text(fit: &ReadingFit, gains: &PooledGain, factor: f64) -> String {
+fn mean_text(fit: &ProfileFit, gains: &PooledGain, factor: f64) -> String {
     if let Some(Mean {
         value,
         interval: Some([low, high]),
@@ -58,12 +58,12 @@ fn mean_text(fit: &ReadingFit, gains: &PooledGain, factor: f64) -> String {
 }
 
 /// One line of text for each pair and each noise profile.
-pub(super) fn pair_lines(fits: &[ReadingFit]) -> impl Iterator<Item = String> {
+pub(super) fn pair_lines(fits: &[ProfileFit]) -> impl Iterator<Item = String> {
     fits.iter()
         .flat_map(|fit| fit.pairs.iter().map(|pair| pair_line(fit, pair)))
 }
 
-fn pair_line(fit: &ReadingFit, PairFit { pair, fit: result }: &PairFit) -> String {
+fn pair_line(fit: &ProfileFit, PairFit { pair, fit: result }: &PairFit) -> String {
     let gain = result.gain.map(|gain| match fit.ratio {
         Some(ratio) => format!(
             "rK {} (K {} at r {})",
@@ -76,7 +76,7 @@ fn pair_line(fit: &ReadingFit, PairFit { pair, fit: result }: &PairFit) -> Strin
     let misfit = result.misfit.map(|misfit| format!("misfit {misfit:.2}"));
     let outcome = (result.outcome != FitOutcome::Fitted).then(|| result.outcome.to_string());
     let parts: Vec<String> = [gain, misfit, outcome].into_iter().flatten().collect();
-    format!("{pair}, {}: {}", fit.reading, parts.join(", "))
+    format!("{pair}, {}: {}", fit.profile, parts.join(", "))
 }
 
 /// Formats a number with three significant digits.
@@ -91,13 +91,13 @@ fn number(value: f64) -> String {
 }
 
 /// CSV file with a row for each pair and each noise profile.
-pub(crate) fn csv(fits: &[ReadingFit]) -> Result<Vec<u8>> {
+pub(crate) fn csv(fits: &[ProfileFit]) -> Result<Vec<u8>> {
     let rows = fits
         .iter()
         .flat_map(|fit| fit.pairs.iter().map(move |pair| (fit, pair)));
     let table = TableBuilder::new("fits", rows)
         .column(Text, "csv pair", |(_, pair)| pair.pair.clone())
-        .column(Text, "csv reading", |(fit, _)| fit.reading.to_string())
+        .column(Text, "csv reading", |(fit, _)| fit.profile.to_string())
         .column(Number, "csv gain", |(_, pair)| pair.fit.gain)
         .column(Number, "csv ratio", |(fit, _)| fit.ratio)
         .column(Number, "csv ratio_gain", |(fit, pair)| {

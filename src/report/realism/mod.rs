@@ -15,7 +15,7 @@ use crate::text::table::ColumnKind::{Count, Text};
 use crate::text::table::TableBuilder;
 use crate::text::terminal;
 use crate::text::words::counted;
-use darkqa_score::photographs::realism::gain::ReadingFit;
+use darkqa_score::photographs::realism::gain::ProfileFit;
 use darkqa_score::photographs::realism::mean::{MIN_VALUES, Mean};
 use darkqa_score::photographs::realism::residual::{Bins, EmptyBins};
 use darkqa_score::photographs::realism::{ImageComparison, PairComparison};
@@ -36,7 +36,7 @@ pub(crate) struct RealismSummary {
     /// One row for each noise profile and camera.
     noise: Vec<NoiseRow>,
     /// Fitted gains by noise profile; empty without `--fit`.
-    fits: Vec<ReadingFit>,
+    fits: Vec<ProfileFit>,
     /// One line of text for each pair.
     #[serde(skip)]
     pair_lines: Vec<String>,
@@ -131,7 +131,7 @@ impl RealismSummary {
         rules: ResidualRules,
         source: ComparedData,
         pairs: &[&PairComparison],
-        fits: Vec<ReadingFit>,
+        fits: Vec<ProfileFit>,
     ) -> Result<Self> {
         let drops: Vec<f64> = pairs.iter().map(|pair| f64::from(pair.drop)).collect();
         let exposures: Vec<&ImageComparison> = pairs.iter().map(|pair| &pair.exposure).collect();
@@ -236,7 +236,7 @@ impl RealismSummary {
             .iter()
             .map(|row| {
                 let psnr = mean_text(&row.clean_psnr, 2);
-                format!("{} {psnr} dB", row.method.reading)
+                format!("{} {psnr} dB", row.method.profile)
             })
             .collect();
         clean.dedup();

@@ -9,7 +9,7 @@ use crate::text::wrapped::wrapped;
 use crate::types::replies::OBSERVER;
 use darkqa_score::accuracies::AccuracyCell;
 use darkqa_score::choice::ReadingMode;
-use darkqa_score::subject::{CHANCE, is_observer, without_run};
+use darkqa_score::model_in_condition::{CHANCE, is_observer, without_run};
 
 /// Mark of an accuracy that is detected to be below the accuracy without images.
 pub(super) const BELOW: char = '▼';

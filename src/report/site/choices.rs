@@ -12,8 +12,8 @@ use darkqa_score::choice::ReadingMode;
 use darkqa_score::comparisons::{Comparison, ComparisonKind, RankRange};
 use darkqa_score::estimate::Estimate;
 use darkqa_score::findings::Findings;
+use darkqa_score::model_in_condition::{ModelInCondition, is_reference};
 use darkqa_score::significance::Significance;
-use darkqa_score::subject::{ModelInCondition, is_reference};
 use darkqa_score::threshold::{NoThreshold, Threshold as EvThreshold};
 
 /// Results of one model in one run.

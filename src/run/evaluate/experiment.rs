@@ -26,7 +26,7 @@ use crate::store::Store;
 use crate::types::manifests::{Columns, Identity, PartPlace};
 use crate::types::{ChoiceDetail, QuestionId, Record, RunQuestion, SetLight, View};
 use darkqa_questions::rules::Rules;
-use darkqa_score::subject::is_reference;
+use darkqa_score::model_in_condition::is_reference;
 
 impl Experiment for ChoiceSetup<'_> {
     type Item = ChoiceItem;

@@ -15,6 +15,7 @@ use crate::engine::dark_already;
 use crate::engine::models::{self, ModelName, ModelUnderTest};
 use crate::engine::observer::Observer;
 use crate::engine::room_net::RoomNet;
+use crate::engine::settings::JobSettings;
 use crate::error::Result;
 use crate::images::enhancement::evenly_spaced_indices;
 use crate::images::frames::{Source, first_question_per_frame, inspect_all, photographs};
@@ -103,17 +104,7 @@ impl<'a> ChoiceSetup<'a> {
         photographs::check_matches(&sources, &job.light.matches)?;
         photographs::print_darkness(&*dataset, &sources, progress);
         dark_already::print_note(job, progress);
-        if !job.enhancers.is_empty()
-            && job
-                .enhancers
-                .on()
-                .intersection(TreatmentSet::DARK)
-                .is_none()
-            && !photographs::names(&sources).is_empty()
-        {
-            let line = "the photographs in the dark are not enhanced; --llie-on noise,dark enhances them too";
-            progress.print_on_terminal(line);
-        }
+        print_raw_photographs(job, &sources, progress);
         let mut recipe = Recipe::new(&job.light.kinds, job.format, job.max_side, &enhancer_files);
         if shows_images {
             recipe = recipe.with_enhanced_images(&job.enhancers.enhanced)?;
@@ -225,6 +216,20 @@ fn warn_of_guesses(questions: &[Question], rules: &Rules) {
         tracing::warn!(
             "room-net guesses {unknown} of {} questions, because no rule made them",
             questions.len()
+        );
+    }
+}
+
+/// Prints that photographs in the dark stay raw, if other images are enhanced.
+fn print_raw_photographs(job: &JobSettings, sources: &[Source], progress: &Progress) {
+    let are_enhanced = job
+        .enhancers
+        .on()
+        .intersection(TreatmentSet::DARK)
+        .is_some();
+    if !job.enhancers.is_empty() && !are_enhanced && !photographs::names(sources).is_empty() {
+        progress.print_on_terminal(
+            "the photographs in the dark are not enhanced; --llie-on noise,dark enhances them too",
         );
     }
 }

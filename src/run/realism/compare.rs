@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::types::{FrameId, Rgb};
 use darkqa_light::raw::noise::Term;
 use darkqa_light::{Negative, NoiseKey, SensorSettings, Synthesis, expose_by};
-use darkqa_score::photographs::realism::gain::ReadingFit;
+use darkqa_score::photographs::realism::gain::ProfileFit;
 use darkqa_score::photographs::realism::residual::{Residuals, divergence};
 use darkqa_score::photographs::realism::ssim::ssim;
 use darkqa_score::photographs::realism::{
@@ -32,7 +32,7 @@ pub(super) fn compare(
     args: &RealismArgs,
     sensor: &SensorSettings,
     pairs: &[CheckedPair<'_>],
-    fits: &[ReadingFit],
+    fits: &[ProfileFit],
     workers: &PairWorkers<'_>,
 ) -> (Vec<PairWork>, Vec<String>) {
     let compared = workers.map("pairs", pairs, |index, checked| {
@@ -54,17 +54,17 @@ pub(super) fn compare(
 /// The noise methods for a pair: each noise profile with the given camera, and with the fitted one.
 fn methods(
     sensor: &SensorSettings,
-    fits: &[ReadingFit],
+    fits: &[ProfileFit],
     pair: &str,
 ) -> Result<Vec<(NoiseMethod, Synthesis)>> {
     let mut methods = Vec::new();
     for (profile, synthesis) in sensor.readings.iter() {
         let method = |camera| NoiseMethod {
-            reading: profile.clone(),
+            profile: profile.clone(),
             camera,
         };
         methods.push((method(CameraOrigin::Given), synthesis.clone()));
-        let fit = fits.iter().find(|fit| fit.reading == *profile);
+        let fit = fits.iter().find(|fit| fit.profile == *profile);
         if let Some((fit, (gains, origin))) = fit.and_then(|fit| Some((fit, fit.for_pair(pair)?))) {
             let camera = fitted_camera(&synthesis.camera, fit, gains.range)?;
             let fitted = Synthesis {
@@ -81,7 +81,7 @@ fn compare_pair(
     args: &RealismArgs,
     sensor: &SensorSettings,
     checked: &CheckedPair<'_>,
-    fits: &[ReadingFit],
+    fits: &[ProfileFit],
     with_images: bool,
 ) -> Result<PairWork> {
     let (normal, real) = load(args, checked.pair, None)?;

@@ -13,7 +13,7 @@ use crate::report::realism as report;
 use crate::report::realism::{PooledResiduals, RealismSummary};
 use darkqa_light::{SensorSettings, Synthesis};
 use darkqa_score::photographs::realism::PairComparison;
-use darkqa_score::photographs::realism::gain::{PooledGain, ReadingFit};
+use darkqa_score::photographs::realism::gain::{PooledGain, ProfileFit};
 use darkqa_score::photographs::realism::residual::Residuals;
 
 /// Writes the numbers of each pair, the summary and the figures into a folder.
@@ -60,7 +60,7 @@ fn sum_residuals(works: &[PairWork], index: usize) -> Residuals {
 
 /// Writes the fitted gains of each pair, and a camera file for each noise profile with fitted pairs: `fitted.toml` if there is one noise
 /// profile, else `fitted-PROFILE.toml`.
-pub(super) fn write_fits(out: &Path, sensor: &SensorSettings, fits: &[ReadingFit]) -> Result<()> {
+pub(super) fn write_fits(out: &Path, sensor: &SensorSettings, fits: &[ProfileFit]) -> Result<()> {
     if fits.is_empty() {
         return Ok(());
     }
@@ -68,10 +68,10 @@ pub(super) fn write_fits(out: &Path, sensor: &SensorSettings, fits: &[ReadingFit
     for fit in fits {
         let file = match fits {
             [_] => "fitted.toml".to_owned(),
-            _ => format!("fitted-{}.toml", fit.reading),
+            _ => format!("fitted-{}.toml", fit.profile),
         };
         let path = out.join(file);
-        let synthesis = sensor.readings.get(&fit.reading);
+        let synthesis = sensor.readings.get(&fit.profile);
         if let Some((synthesis, gains)) = synthesis.zip(fit.pooled.as_ref()) {
             write(&path, camera_file(synthesis, fit, gains)?.as_bytes())?;
         } else {
@@ -83,7 +83,7 @@ pub(super) fn write_fits(out: &Path, sensor: &SensorSettings, fits: &[ReadingFit
             tracing::warn!(
                 "{}: not written, because no pair is fitted under {}{earlier}",
                 path.display(),
-                fit.reading
+                fit.profile
             );
         }
     }
@@ -91,7 +91,7 @@ pub(super) fn write_fits(out: &Path, sensor: &SensorSettings, fits: &[ReadingFit
 }
 
 /// A camera file with the fitted range of K.
-fn camera_file(synthesis: &Synthesis, fit: &ReadingFit, gains: &PooledGain) -> Result<String> {
+fn camera_file(synthesis: &Synthesis, fit: &ProfileFit, gains: &PooledGain) -> Result<String> {
     let fitted = fitted_camera(&synthesis.camera, fit, gains.range)?;
     let mut calibration = fitted.calibration().clone();
     let base = std::mem::replace(
@@ -101,7 +101,7 @@ fn camera_file(synthesis: &Synthesis, fit: &ReadingFit, gains: &PooledGain) -> R
     let mut comments = vec![
         format!(
             "The sensor {base} with its gain K fitted to the noise of real images under the noise profile {}, {}.",
-            fit.reading,
+            fit.profile,
             report::AS_SAVED
         ),
         format!(

@@ -9,7 +9,7 @@ use darkqa_light::{
     CameraModel, CameraState, CleanRaw, Coupling, NoiseKey, Sampling, SensorSettings, Synthesis,
 };
 use darkqa_score::photographs::realism::gain::{
-    GAINS, GainFit, LADDER_STEPS, PairFit, ReadingFit, ladder,
+    GAINS, GainFit, LADDER_STEPS, PairFit, ProfileFit, ladder,
 };
 use darkqa_score::photographs::realism::smooth::SmoothBlocks;
 
@@ -22,7 +22,7 @@ pub(super) fn fit(
     sensor: &SensorSettings,
     pairs: &[CheckedPair<'_>],
     workers: &PairWorkers<'_>,
-) -> Result<Vec<ReadingFit>> {
+) -> Result<Vec<ProfileFit>> {
     let profiles: Vec<ProfileLadder> = sensor
         .readings
         .iter()
@@ -47,7 +47,7 @@ pub(super) fn fit(
                     })
                 })
                 .collect();
-            ReadingFit::new(profile.name.clone(), profile.ratio(), pair_fits)
+            ProfileFit::new(profile.name.clone(), profile.ratio(), pair_fits)
         })
         .collect())
 }
@@ -126,7 +126,7 @@ fn fit_pair(
 /// If the camera does not take the range or the ratio.
 pub(super) fn fitted_camera(
     camera: &CameraModel,
-    fit: &ReadingFit,
+    fit: &ProfileFit,
     range: [f64; 2],
 ) -> Result<CameraModel> {
     let mut fitted = camera.clone();

@@ -26,7 +26,7 @@ use crate::report::realism::{ComparedData, RealismSummary, ResidualRules};
 use crate::runs::Outcome;
 use darkqa_light::SensorSettings;
 use darkqa_score::photographs::realism::PairComparison;
-use darkqa_score::photographs::realism::gain::ReadingFit;
+use darkqa_score::photographs::realism::gain::ProfileFit;
 
 /// Compares all pairs. If one fails, the error is logged and counted, and the others continue.
 ///
@@ -80,7 +80,7 @@ fn summary(
     args: &RealismArgs,
     source: ComparedData,
     works: &[PairWork],
-    fits: Vec<ReadingFit>,
+    fits: Vec<ProfileFit>,
 ) -> Result<RealismSummary> {
     if works.is_empty() {
         return Err(Error::data("pairs", "no pair could be compared"));

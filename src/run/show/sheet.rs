@@ -19,7 +19,7 @@ use crate::runs::sharded_run::open_choice_run;
 use crate::types::degradations::Kind;
 use crate::types::manifests::{RunManifest, Status};
 use crate::types::{AxisLevel, Condition, Record, Rgb, TrialOutcome, Variant};
-use darkqa_score::subject::is_control;
+use darkqa_score::model_in_condition::is_control;
 
 /// Draws and writes the picture. The outcome lists the conditions left out, and the images that differ from those sent.
 ///

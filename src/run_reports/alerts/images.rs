@@ -6,7 +6,7 @@ use crate::run_reports::combine::Combined;
 use crate::text::alert::{Alert, AlertKind};
 use crate::types::{Digest, QuestionId, RunQuestion, SetLight};
 use darkqa_score::answers::{Independence, LitReply};
-use darkqa_score::subject::without_run;
+use darkqa_score::model_in_condition::without_run;
 
 /// One alert for each model at an endpoint whose replies about untouched images do not depend on the image. Returns none for photographs
 /// taken in the dark, where a model may see nothing.

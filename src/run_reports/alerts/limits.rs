@@ -6,7 +6,7 @@ use crate::run_reports::join::{Joined, JoinedRun};
 use crate::text::alert::{Alert, AlertKind};
 use crate::text::words::plural;
 use darkqa_score::answers::record::Detail;
-use darkqa_score::subject::without_run;
+use darkqa_score::model_in_condition::without_run;
 
 /// One alert for each model asked with more than its first token limit, with the number of replies at each limit.
 pub(super) fn limit_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {

@@ -10,7 +10,7 @@ use crate::text::words::counted;
 use crate::types::{QuestionId, RunQuestion, TrialRef};
 use darkqa_score::answers::record::Detail;
 use darkqa_score::findings::Findings;
-use darkqa_score::subject::is_control;
+use darkqa_score::model_in_condition::is_control;
 
 /// Alerts about differences between the questions of the runs, and between their image files.
 pub(super) fn question_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {

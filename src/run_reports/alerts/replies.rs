@@ -116,7 +116,7 @@ pub(super) fn people_alerts(combined: &Combined) -> Vec<Alert> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use darkqa_score::subject::ModelInCondition;
+    use darkqa_score::model_in_condition::ModelInCondition;
 
     fn health(condition: &str, read: usize) -> Health {
         Health {

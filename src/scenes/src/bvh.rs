@@ -5,7 +5,7 @@
 
 use std::ops::Range;
 
-use glam::{Vec3, Vec4, vec3};
+use glam::{Vec3, Vec4};
 
 /// A ray.
 #[derive(Debug, Clone, Copy)]
@@ -26,16 +26,14 @@ impl Ray {
 
     pub(super) fn new(origin: Vec3, direction: Vec3) -> Self {
         // No component is 0, so that 0 × ∞ cannot occur: its result differs between machines.
-        let inverse = |value: f32| 1.0 / if value.abs() < 1e-9 { 1e-9 } else { value };
+        let inverse = direction
+            .to_array()
+            .map(|value| 1.0 / if value.abs() < 1e-9 { 1e-9 } else { value });
         Self {
             origin,
             direction,
             spread: LIGHT_SPREAD,
-            inverse: vec3(
-                inverse(direction.x),
-                inverse(direction.y),
-                inverse(direction.z),
-            ),
+            inverse: Vec3::from(inverse),
         }
     }
 }
@@ -289,11 +287,11 @@ struct BoxTester {
 
 impl BoxTester {
     fn new(ray: &Ray) -> Self {
-        let backwards = |axis: usize| u8::from(ray.inverse[axis] < 0.0) << axis;
+        let [x, y, z] = [0, 1, 2].map(|axis| u8::from(ray.inverse[axis] < 0.0) << axis);
         Self {
             origin: ray.origin.to_array().map(Vec4::splat),
             inverse: ray.inverse.to_array().map(Vec4::splat),
-            backwards: backwards(0) | backwards(1) | backwards(2),
+            backwards: x | y | z,
         }
     }
 

@@ -103,7 +103,6 @@ impl FloorPlan {
 
     /// True if a point is over or under a horizontal triangle of a thing, within 12 mm in height.
     fn is_on_surface(&self, thing: usize, point: Vec3) -> bool {
-        let flat = |v: Vec3| vec2(v.x, v.z);
         self.faces(thing).any(|face| {
             let corners = face.corners.map(|corner| corner.position);
             if !corners
@@ -112,7 +111,7 @@ impl FloorPlan {
             {
                 return false;
             }
-            let [a, b, c] = corners.map(|corner| flat(corner) - flat(point));
+            let [a, b, c] = corners.map(|corner| vec2(corner.x - point.x, corner.z - point.z));
             let turns = [a.perp_dot(b), b.perp_dot(c), c.perp_dot(a)];
             turns.iter().all(|turn| *turn >= 0.0) || turns.iter().all(|turn| *turn <= 0.0)
         })

@@ -408,23 +408,24 @@ mod tests {
                 size: [64, 48],
                 light,
             };
-            let drawn = |room: &Room| {
-                let frame = room.frame().unwrap();
-                let maps = (frame.depth, frame.semantic, frame.segments);
-                let light = room.light().map(|light| light.samples().to_vec());
-                (frame.id, frame.rgb, maps, frame.names, light)
-            };
             // Both frames of scene 17, drawn first, and drawn after the frames of scenes 15 and 16.
-            let draw_frames = |first, count| {
+            let [alone, in_a_row] = [(34, 2), (30, 6)].map(|(first, count)| {
                 let rooms: Vec<Room> = rooms
                     .all()
                     .map(|(_, room)| room)
                     .skip(first)
                     .take(count)
                     .collect();
-                rooms.iter().map(drawn).collect::<Vec<_>>()
-            };
-            let (alone, in_a_row) = (draw_frames(34, 2), draw_frames(30, 6));
+                rooms
+                    .iter()
+                    .map(|room| {
+                        let frame = room.frame().unwrap();
+                        let maps = (frame.depth, frame.semantic, frame.segments);
+                        let light = room.light().map(|light| light.samples().to_vec());
+                        (frame.id, frame.rgb, maps, frame.names, light)
+                    })
+                    .collect::<Vec<_>>()
+            });
             assert!(alone == in_a_row[4..]);
             assert!(alone[0] != alone[1]);
         }

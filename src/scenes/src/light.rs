@@ -44,11 +44,10 @@ impl LightSample {
         let count = STRATA * STRATA;
         let stratum = (self.stratum * [1, 5, 11, 13][purpose % 4] + purpose * 7) % count;
         let [x, y] = self.pixel;
-        let jitter = |axis: i32| hash(x.wrapping_add(purpose as i32 * 131), y, axis);
-        [
-            ((stratum % STRATA) as f32 + jitter(21)) / STRATA as f32,
-            ((stratum / STRATA) as f32 + jitter(22)) / STRATA as f32,
-        ]
+        [(stratum % STRATA, 21), (stratum / STRATA, 22)].map(|(cell, axis)| {
+            let jitter = hash(x.wrapping_add(purpose as i32 * 131), y, axis);
+            (cell as f32 + jitter) / STRATA as f32
+        })
     }
 }
 

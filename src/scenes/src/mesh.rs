@@ -49,6 +49,33 @@ const SIDES: usize = 20;
 /// Number of rows of shapes that are round in two directions (chosen).
 const ROWS: usize = 10;
 
+/// Normal of a point of a grid; `is_closed` if the first column of the grid is also its last.
+fn grid_normal(rows: &[Vec<Vec3>], [y, x]: [usize; 2], is_closed: bool) -> Vec3 {
+    let (height, width) = (rows.len(), rows[0].len());
+    let (left, right) = match (x, is_closed) {
+        (0, true) => (width - 2, 1),
+        (x, true) if x == width - 1 => (x - 1, 1),
+        _ => (x.saturating_sub(1), (x + 1).min(width - 1)),
+    };
+    let mut along = rows[y][right] - rows[y][left];
+    let (above, below) = (y.saturating_sub(1), (y + 1).min(height - 1));
+    let mut across = rows[below][x] - rows[above][x];
+    if along.length_squared() < 1e-12 {
+        // At the pole of a round shape the neighbouring row gives the direction.
+        let near = if y == 0 { 1 } else { y - 1 };
+        along = rows[near][right] - rows[near][left];
+    }
+    if across.length_squared() < 1e-12 {
+        across = rows[below][x] - rows[y][x];
+    }
+    along.cross(across).normalize_or_zero()
+}
+
+/// −1 for negative numbers, otherwise 1.
+pub(super) fn sign(value: f32) -> f32 {
+    if value < 0.0 { -1.0 } else { 1.0 }
+}
+
 /// Cosine (x) and sine (y) of an angle in radians, the same on every machine.
 pub(super) fn cos_sin(angle: f32) -> Vec2 {
     let (sine, cosine) = libm::sincosf(angle);
@@ -74,12 +101,13 @@ impl Mesh {
     }
 
     /// Adds a flat quadrilateral. The order of its corners determines the normal: (b − a) × (d − a).
-    pub(super) fn quad(&mut self, [a, b, c, d]: [Vec3; 4], surface: &Surface) {
+    pub(super) fn quad(&mut self, corners: [Vec3; 4], surface: &Surface) {
         let surface = self.surface_index(surface);
+        let [a, b, _, d] = corners;
         let normal = (b - a).cross(d - a).normalize_or_zero();
-        let corner = |position| Corner { position, normal };
-        self.triangle([a, b, c].map(corner), surface);
-        self.triangle([a, c, d].map(corner), surface);
+        let [a, b, c, d] = corners.map(|position| Corner { position, normal });
+        self.triangle([a, b, c], surface);
+        self.triangle([a, c, d], surface);
     }
 
     /// Adds a smooth surface over a grid of points. All rows have the same length.
@@ -89,31 +117,12 @@ impl Mesh {
         let is_closed = rows
             .iter()
             .all(|row| row[0].distance_squared(row[width - 1]) < 1e-10);
-        let normal = |y: usize, x: usize| {
-            let (left, right) = match (x, is_closed) {
-                (0, true) => (width - 2, 1),
-                (x, true) if x == width - 1 => (x - 1, 1),
-                _ => (x.saturating_sub(1), (x + 1).min(width - 1)),
-            };
-            let mut along = rows[y][right] - rows[y][left];
-            let (above, below) = (y.saturating_sub(1), (y + 1).min(height - 1));
-            let mut across = rows[below][x] - rows[above][x];
-            if along.length_squared() < 1e-12 {
-                // At the pole of a round shape the neighbouring row gives the direction.
-                let near = if y == 0 { 1 } else { y - 1 };
-                along = rows[near][right] - rows[near][left];
-            }
-            if across.length_squared() < 1e-12 {
-                across = rows[below][x] - rows[y][x];
-            }
-            along.cross(across).normalize_or_zero()
-        };
         let corners: Vec<Vec<Corner>> = (0..height)
             .map(|y| {
                 (0..width)
                     .map(|x| Corner {
                         position: rows[y][x],
-                        normal: normal(y, x),
+                        normal: grid_normal(rows, [y, x], is_closed),
                     })
                     .collect()
             })
@@ -182,12 +191,6 @@ impl Mesh {
     pub(super) fn rounded_box(&mut self, low: Vec3, high: Vec3, radius: f32, surface: &Surface) {
         let radius = radius.min((high - low).min_element() / 2.0 * 0.999);
         let (middle, inner) = ((low + high) / 2.0, (high - low) / 2.0 - Vec3::splat(radius));
-        let ball = |row: usize, side: usize| {
-            let down = cos_sin(PI * row as f32 / ROWS as f32);
-            let around = cos_sin(TAU * (side as f32 + 0.5) / SIDES as f32);
-            vec3(around.x * down.y, down.x, around.y * down.y)
-        };
-        let sign = |value: f32| if value < 0.0 { -1.0 } else { 1.0 };
         // The middle row is doubled, so that the flat sides between the rounded edges stay flat.
         let mut rows = Vec::new();
         for (row, end) in (0..=ROWS).flat_map(|row| {
@@ -204,7 +207,9 @@ impl Mesh {
             let mut line: Vec<Vec3> = (0..SIDES)
                 .rev()
                 .map(|side: usize| {
-                    let out = ball(row, side);
+                    let down = cos_sin(PI * row as f32 / ROWS as f32);
+                    let around = cos_sin(TAU * (side as f32 + 0.5) / SIDES as f32);
+                    let out = vec3(around.x * down.y, down.x, around.y * down.y);
                     let corner = vec3(sign(out.x), height, sign(out.z)) * inner;
                     middle + corner + out * radius
                 })
@@ -273,15 +278,15 @@ impl Mesh {
         let aside = if axis.y.abs() > 0.9 { Vec3::X } else { Vec3::Y };
         let across = axis.cross(aside).normalize_or_zero();
         let over = axis.cross(across);
-        let ring = |middle: Vec3, radius: f32| -> Vec<Vec3> {
-            (0..=SIDES)
-                .map(|side: usize| {
-                    let around = cos_sin(TAU * (side % SIDES) as f32 / SIDES as f32);
-                    middle + (across * around.x + over * around.y) * radius
-                })
-                .collect()
-        };
-        let (low, high) = (ring(from, radii[0]), ring(to, radii[1]));
+        let [low, high]: [Vec<Vec3>; 2] =
+            [(from, radii[0]), (to, radii[1])].map(|(middle, radius)| {
+                (0..=SIDES)
+                    .map(|side: usize| {
+                        let around = cos_sin(TAU * (side % SIDES) as f32 / SIDES as f32);
+                        middle + (across * around.x + over * around.y) * radius
+                    })
+                    .collect()
+            });
         self.grid(&[low.clone(), high.clone()], surface);
         self.cap(&low, -axis, surface);
         self.cap(&high, axis, surface);
@@ -311,8 +316,9 @@ impl Mesh {
         let tilt = cos_sin(lean);
         for side in [1.0_f32, -1.0] {
             let point = |row: usize, column: usize| {
-                let along = |cell: usize| 2.0 * cell as f32 / CELLS as f32 - 1.0;
-                let (u, v) = (along(column) * side, -along(row));
+                let [across, down] =
+                    [column, row].map(|cell| 2.0 * cell as f32 / CELLS as f32 - 1.0);
+                let (u, v) = (across * side, -down);
                 let (u4, v4) = (u * u * u * u, v * v * v * v);
                 let swell = ((1.0 - u4) * (1.0 - v4)).max(0.0).sqrt();
                 // The corners reach a little farther out than the middle of the edges.
@@ -342,38 +348,40 @@ impl Mesh {
         surface: &Surface,
     ) {
         let columns = ((width / fold) as usize).max(1) * 8;
-        let point = |column: usize, height: f32| {
-            let share = column as f32 / columns as f32;
-            let wave = cos_sin(TAU * share * width / fold).y;
-            let depth = 0.3 * fold * wave * (0.6 + 0.4 * height);
-            left + vec3(share * width, -height * drop, depth)
-        };
-        let rows: Vec<Vec<Vec3>> = [0.0, 0.33, 0.67, 1.0]
-            .iter()
-            .map(|height| (0..=columns).map(|column| point(column, *height)).collect())
-            .collect();
+        let rows: [Vec<Vec3>; 4] = [0.0, 0.33, 0.67, 1.0].map(|height| {
+            (0..=columns)
+                .map(|column| {
+                    let share = column as f32 / columns as f32;
+                    let wave = cos_sin(TAU * share * width / fold).y;
+                    let depth = 0.3 * fold * wave * (0.6 + 0.4 * height);
+                    left + vec3(share * width, -height * drop, depth)
+                })
+                .collect()
+        });
         self.grid(&rows, surface);
     }
 
     /// Adds another mesh, rotated about y by `angle` and then moved by `offset`.
     pub(super) fn add(&mut self, other: &Self, offset: Vec3, angle: f32) {
         let rotation = cos_sin(angle);
-        let rotate = |v: Vec3| {
-            vec3(
-                v.x * rotation.x + v.z * rotation.y,
-                v.y,
-                v.z * rotation.x - v.x * rotation.y,
-            )
-        };
         let surfaces: Vec<usize> = other
             .surfaces
             .iter()
             .map(|s| self.surface_index(s))
             .collect();
         self.faces.extend(other.faces.iter().map(|face| Face {
-            corners: face.corners.map(|corner| Corner {
-                position: offset + rotate(corner.position),
-                normal: rotate(corner.normal),
+            corners: face.corners.map(|corner| {
+                let [position, normal] = [corner.position, corner.normal].map(|v| {
+                    vec3(
+                        v.x * rotation.x + v.z * rotation.y,
+                        v.y,
+                        v.z * rotation.x - v.x * rotation.y,
+                    )
+                });
+                Corner {
+                    position: offset + position,
+                    normal,
+                }
             }),
             surface: surfaces[face.surface],
         }));

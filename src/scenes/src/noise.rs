@@ -19,9 +19,18 @@ pub(super) fn value_noise(position: Vec3) -> f32 {
     let share = position - cell;
     let share = share * share * (Vec3::splat(3.0) - 2.0 * share);
     let [x, y, z] = [cell.x as i32, cell.y as i32, cell.z as i32];
-    let at = |i: i32, j: i32, k: i32| hash(x.wrapping_add(i), y.wrapping_add(j), z.wrapping_add(k));
-    let mix = |a: f32, b: f32, share: f32| a + (b - a) * share;
-    let row = |j: i32, k: i32| mix(at(0, j, k), at(1, j, k), share.x);
-    let sheet = |k: i32| mix(row(0, k), row(1, k), share.y);
-    mix(sheet(0), sheet(1), share.z)
+    let sheets = [0, 1].map(|k| {
+        let rows = [0, 1].map(|j| {
+            let corners =
+                [0, 1].map(|i| hash(x.wrapping_add(i), y.wrapping_add(j), z.wrapping_add(k)));
+            mix(corners, share.x)
+        });
+        mix(rows, share.y)
+    });
+    mix(sheets, share.z)
+}
+
+/// Interpolates linearly between two values.
+fn mix([a, b]: [f32; 2], share: f32) -> f32 {
+    a + (b - a) * share
 }

@@ -76,14 +76,12 @@ impl PatternPoint {
 
     /// Brightness of wood with streaks along an axis.
     fn grain(&self, position: Vec3, axis: usize) -> f32 {
-        let streaks_with = |cells: f32, stretch: f32| {
-            let mut cells = Vec3::splat(cells);
-            cells[axis] *= stretch;
-            self.noise_at(position, cells)
-        };
-        let fine = streaks_with(190.0, 0.04);
-        let streaks = streaks_with(70.0, 0.05);
-        let broad = streaks_with(14.0, 0.1);
+        let [fine, streaks, broad] =
+            [(190.0, 0.04), (70.0, 0.05), (14.0, 0.1)].map(|(cells, stretch)| {
+                let mut cells = Vec3::splat(cells);
+                cells[axis] *= stretch;
+                self.noise_at(position, cells)
+            });
         0.97 + 0.1 * fine + 0.16 * streaks + 0.12 * broad
     }
 
@@ -176,13 +174,9 @@ impl PatternPoint {
     /// Colour of a rug.
     fn rug(&self, color: Vec3, size: Vec2, border: Vec3) -> Vec3 {
         let edge = (size.x / 2.0 - self.position.x.abs()).min(size.y / 2.0 - self.position.z.abs());
-        let diamond = |cells: f32| {
-            let at = self.uv * cells;
-            let at = (at - at.floor() - 0.5).abs();
-            at.x + at.y
-        };
-        let motif = edge > 0.22 && (0.3..0.42).contains(&diamond(3.1));
-        let small = edge < 0.17 && diamond(12.0) < 0.3 || edge > 0.22 && diamond(9.3) < 0.2;
+        let motif = edge > 0.22 && (0.3..0.42).contains(&diamond(self.uv * 3.1));
+        let small = edge < 0.17 && diamond(self.uv * 12.0) < 0.3
+            || edge > 0.22 && diamond(self.uv * 9.3) < 0.2;
         let dyed = match () {
             () if (0.03..0.05).contains(&edge) || (0.17..0.2).contains(&edge) || motif => border,
             () if small => color.lerp(border, 0.55),
@@ -257,29 +251,36 @@ fn project_to_axis_plane(position: Vec3, normal: Vec3) -> Vec2 {
     }
 }
 
+/// Distance to the middle of a cell of size 1, along its sides.
+fn diamond(at: Vec2) -> f32 {
+    let at = (at - at.floor() - 0.5).abs();
+    at.x + at.y
+}
+
+/// Colour of part `i` of a painting.
+fn tint(seed: i32, i: i32) -> Vec3 {
+    let light = 0.12 + 0.6 * hash(seed, i, 5);
+    Vec3::from([6, 7, 8].map(|channel| light * (0.3 + 1.1 * hash(seed, i, channel))))
+}
+
 /// Colour of a painting of hills, discs or rectangles, depending on its seed.
 fn painting(position: Vec3, size: Vec2, seed: u32) -> Vec3 {
     let seed = seed as i32;
     let at = vec2(position.x / size.x + 0.5, position.y / size.y);
-    let tint = |i: i32| {
-        let light = 0.12 + 0.6 * hash(seed, i, 5);
-        let dyed = |which| light * (0.3 + 1.1 * hash(seed, i, which));
-        vec3(dyed(6), dyed(7), dyed(8))
-    };
     let strokes = 0.75 + 0.5 * value_noise(position * vec3(60.0, 140.0, 1.0));
     // Three of seven paintings have a paper margin.
     let margin = at.min(1.0 - at) * size;
     if seed % 7 < 3 && margin.min_element() < 0.06 {
         return vec3(0.66, 0.64, 0.58);
     }
-    let mut color = tint(0) * (0.7 + 0.6 * at.y);
+    let mut color = tint(seed, 0) * (0.7 + 0.6 * at.y);
     match seed % 3 {
         0 => {
             color = color.lerp(vec3(0.6, 0.68, 0.8), 0.3 + 0.5 * at.y);
             for hill in 1..6 {
                 let wave = value_noise(vec3(at.x * 4.0, (hill * 17 + seed) as f32, 0.5));
                 if at.y < 0.78 - 0.14 * hill as f32 + 0.22 * wave {
-                    color = tint(hill);
+                    color = tint(seed, hill);
                 }
             }
         }
@@ -289,7 +290,7 @@ fn painting(position: Vec3, size: Vec2, seed: u32) -> Vec3 {
                 let reach = 0.05 + 0.16 * hash(seed, disc, 11);
                 let away = ((at - middle) * vec2(1.0, size.y / size.x)).length();
                 if away < reach && !(0.6..0.7).contains(&(away / reach)) {
-                    color = tint(disc);
+                    color = tint(seed, disc);
                 }
             }
         }
@@ -298,7 +299,7 @@ fn painting(position: Vec3, size: Vec2, seed: u32) -> Vec3 {
                 let [x, y, to_x, to_y] = [9, 10, 11, 12].map(|which| hash(seed, rectangle, which));
                 let low = vec2(x.min(to_x), y.min(to_y));
                 if at.cmpge(low).all() && at.cmple(vec2(x.max(to_x), y.max(to_y))).all() {
-                    color = tint(rectangle);
+                    color = tint(seed, rectangle);
                 }
             }
         }

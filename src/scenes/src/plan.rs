@@ -337,9 +337,9 @@ impl FloorPlan {
     /// True if a position is at least `margin` metres from walls and furniture, so that a camera fits.
     pub(super) fn has_room_for_camera(&self, position: Vec3, margin: f32) -> bool {
         let point = FloorArea([position.x, position.z, position.x, position.z]);
-        let inside = |value: f32, end: f32| (margin..=end - margin).contains(&value);
-        inside(position.x, self.size.x)
-            && inside(position.z, self.size.z)
+        [(position.x, self.size.x), (position.z, self.size.z)]
+            .iter()
+            .all(|(value, end)| (margin..=end - margin).contains(value))
             && !self.areas.iter().any(|area| area.overlaps(&point, margin))
     }
 }

@@ -133,15 +133,12 @@ impl LightSource {
                 edges,
                 normal,
                 radiance,
-            } => {
-                let turned = |v: Vec3| pose.to_room(v) - pose.position;
-                Self::Panel {
-                    corner: pose.to_room(corner),
-                    edges: edges.map(turned),
-                    normal: turned(normal),
-                    radiance,
-                }
-            }
+            } => Self::Panel {
+                corner: pose.to_room(corner),
+                edges: edges.map(|edge| pose.to_room(edge) - pose.position),
+                normal: pose.to_room(normal) - pose.position,
+                radiance,
+            },
             Self::Bulb {
                 middle,
                 radius,

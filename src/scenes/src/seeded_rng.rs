@@ -55,12 +55,13 @@ impl SeededRng {
 mod tests {
     use super::*;
 
+    fn sequence(seed: u64, purpose: &[&str]) -> [u32; 4] {
+        let mut rng = SeededRng::new(seed, purpose);
+        std::array::from_fn(|_| rng.next_u32())
+    }
+
     #[test]
     fn sequence_depends_on_seed_and_purpose() {
-        let sequence = |seed, purpose: &[&str]| -> Vec<u32> {
-            let mut rng = SeededRng::new(seed, purpose);
-            (0..4).map(|_| rng.next_u32()).collect()
-        };
         assert_eq!(sequence(1, &["a", "b"]), sequence(1, &["a", "b"]));
         assert_ne!(sequence(1, &["a", "b"]), sequence(1, &["ab"]));
         assert_ne!(sequence(1, &["a"]), sequence(2, &["a"]));

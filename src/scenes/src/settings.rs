@@ -64,25 +64,19 @@ impl FromStr for Rooms {
         let mut rooms = Self::default();
         for part in text.split(',').filter(|part| !part.is_empty()) {
             let (key, value) = part.split_once('=').unwrap_or((part, ""));
-            let wrong = |expected: String| format!("{key}={value}: {expected}");
             match (key.trim(), value.trim()) {
-                ("frames", value) => rooms.frames = parse_frames(value).map_err(wrong)?,
-                ("seed", value) => {
-                    rooms.seed = value
-                        .parse()
-                        .map_err(|_| wrong("a whole number expected".to_owned()))?;
-                }
-                ("size", value) => rooms.size = parse_size(value).map_err(wrong)?,
-                ("light", value) => {
-                    rooms.light = RoomLight::from_str(value, false)
-                        .map_err(|_| wrong("display or linear expected".to_owned()))?;
-                }
-                _ => {
-                    return Err(wrong(
-                        "frames=N, seed=N, size=WIDTHxHEIGHT or light=linear expected".to_owned(),
-                    ));
-                }
+                ("frames", value) => parse_frames(value).map(|frames| rooms.frames = frames),
+                ("seed", value) => value
+                    .parse()
+                    .map(|seed| rooms.seed = seed)
+                    .map_err(|_| "a whole number expected".to_owned()),
+                ("size", value) => parse_size(value).map(|size| rooms.size = size),
+                ("light", value) => RoomLight::from_str(value, false)
+                    .map(|light| rooms.light = light)
+                    .map_err(|_| "display or linear expected".to_owned()),
+                _ => Err("frames=N, seed=N, size=WIDTHxHEIGHT or light=linear expected".to_owned()),
             }
+            .map_err(|expected| format!("{key}={value}: {expected}"))?;
         }
         Ok(rooms)
     }

@@ -67,21 +67,17 @@ impl Clusters {
             .map(|(question, frame)| (frame, question))
             .collect();
         let frames: BTreeSet<&FrameId> = pairs.iter().map(|(frame, _)| *frame).collect();
-        let scene_of = |frame: &FrameId| ties.scenes.get(frame).filter(|scene| !scene.is_empty());
-        // The scene of a frame, or the frame itself if it has no scene.
-        let scene_or_frame = |frame: &'a FrameId| match scene_of(frame) {
-            Some(scene) => (Some(scene), None),
-            None => (None, Some(frame)),
-        };
-        let scenes: BTreeSet<(Option<&String>, Option<&FrameId>)> =
-            frames.iter().map(|frame| scene_or_frame(frame)).collect();
+        let scenes: BTreeSet<(Option<&String>, Option<&FrameId>)> = frames
+            .iter()
+            .map(|frame| scene_or_frame(ties, frame))
+            .collect();
         if scenes.len() >= MIN_SCENES && scenes.len() < frames.len() {
             let numbers: BTreeMap<_, u32> = scenes.into_iter().zip(0..).collect();
             return Self {
                 unit: ClusterUnit::Scene,
                 by_frame: frames
                     .iter()
-                    .map(|frame| ((*frame).clone(), numbers[&scene_or_frame(frame)]))
+                    .map(|frame| ((*frame).clone(), numbers[&scene_or_frame(ties, frame)]))
                     .collect(),
                 count: numbers.len(),
                 by_question: HashMap::new(),
@@ -169,6 +165,17 @@ fn number_frames(
     (by_frame, numbers.len())
 }
 
+/// The scene of a frame, or the frame itself if it has no scene.
+fn scene_or_frame<'a>(
+    ties: &'a FrameTies,
+    frame: &'a FrameId,
+) -> (Option<&'a String>, Option<&'a FrameId>) {
+    match ties.scenes.get(frame).filter(|scene| !scene.is_empty()) {
+        Some(scene) => (Some(scene), None),
+        None => (None, Some(frame)),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -194,31 +201,45 @@ mod tests {
         )
     }
 
+    /// Cluster of each frame with its question.
+    fn clusters_of(found: &Clusters, frames: &[FrameId], ids: &[QuestionId]) -> Vec<Option<u32>> {
+        frames
+            .iter()
+            .zip(ids)
+            .map(|(frame, id)| found.get(frame, id))
+            .collect()
+    }
+
     #[test]
     fn frames_that_share_an_image_are_one_cluster() {
-        let name = |name: &str| FrameId(name.to_owned());
         let ids: Vec<QuestionId> = (0..6).map(|i| QuestionId(format!("q{i}"))).collect();
-        let frames = ["ab", "bc", "c", "d", "ef", "a c"].map(name);
-        let images = frames
-            .iter()
-            .filter(|frame| frame.0.len() > 1)
-            .map(|frame| {
-                let images = frame
-                    .0
-                    .chars()
-                    .filter(|letter| *letter != ' ')
-                    .map(|letter| name(&letter.to_string()));
-                (frame.clone(), images.collect())
-            });
+        let frames = ["ab", "bc", "c", "d", "ef", "a c"].map(|images| FrameId(images.to_owned()));
         let ties = FrameTies {
-            images: images.collect(),
+            images: frames
+                .iter()
+                .filter(|frame| frame.0.len() > 1)
+                .map(|frame| {
+                    let images = frame
+                        .0
+                        .chars()
+                        .filter(|letter| *letter != ' ')
+                        .map(|letter| FrameId(letter.to_string()))
+                        .collect();
+                    (frame.clone(), images)
+                })
+                .collect(),
             ..FrameTies::default()
         };
         let found = Clusters::new(ids.iter().zip(&frames), &ties);
-        let of = |frame: usize| found.get(&frames[frame], &ids[frame]);
         assert_eq!((found.count(), found.unit()), (3, ClusterUnit::Frame));
-        assert!([1, 2, 5].iter().all(|frame| of(*frame) == of(0)));
-        assert!(of(3) != of(0) && of(4) != of(0) && of(3) != of(4));
+        let clusters = clusters_of(&found, &frames, &ids);
+        assert!(
+            [1, 2, 5]
+                .iter()
+                .all(|frame| clusters[*frame] == clusters[0])
+        );
+        assert!(clusters[3] != clusters[0] && clusters[4] != clusters[0]);
+        assert!(clusters[3] != clusters[4]);
         let apart = Clusters::new(ids.iter().zip(&frames), &FrameTies::default());
         assert_eq!((apart.count(), apart.unit()), (6, ClusterUnit::Question));
     }
@@ -227,17 +248,19 @@ mod tests {
     fn a_frame_without_a_scene_is_a_scene_of_its_own() {
         let frames: Vec<FrameId> = (0..30).map(|i| FrameId(format!("f{i:02}"))).collect();
         let ids: Vec<QuestionId> = (0..30).map(|i| QuestionId(format!("q{i}"))).collect();
-        let known = frames[..24].iter().enumerate();
         let ties = FrameTies {
-            scenes: known
+            scenes: frames[..24]
+                .iter()
+                .enumerate()
                 .map(|(i, frame)| (frame.clone(), format!("s{}", i % 8)))
                 .collect(),
             ..FrameTies::default()
         };
         let found = Clusters::new(ids.iter().zip(&frames), &ties);
         assert_eq!((found.unit(), found.count()), (ClusterUnit::Scene, 8 + 6));
-        let of = |frame: usize| found.get(&frames[frame], &ids[frame]);
-        assert!(of(0) == of(8) && of(0) != of(1) && of(28) != of(29));
+        let clusters = clusters_of(&found, &frames, &ids);
+        assert!(clusters[0] == clusters[8] && clusters[0] != clusters[1]);
+        assert!(clusters[28] != clusters[29]);
     }
 
     #[test]

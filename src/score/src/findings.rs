@@ -10,16 +10,16 @@ use super::calibration::{Calibration, calibrations};
 use super::choice::ReadingMode;
 use super::cluster::{ClusterUnit, Clusters, FrameTies};
 use super::comparisons::{
-    Agreement, BestInTheDark, Comparison, ComparisonKind, FindingByReading, ModelsLeftOut,
-    PooledFinding, PooledKind, agreements, best_in_the_dark, by_reading, comparisons,
+    Agreement, BestInTheDark, Comparison, ComparisonKind, FindingByProfile, ModelsLeftOut,
+    PooledFinding, PooledKind, agreements, best_in_the_dark, by_profile, comparisons,
     light_agreements, lights_between, models_left_out, pool, pooled,
 };
 use super::grid::Grid;
+use super::model_in_condition::{ModelInCondition, is_control, is_observer};
 use super::observed::ObserverSummary;
 use super::photographs::pair_darkness::{self, PairDarkness};
 use super::photographs::{FidelityFindings, PhotographedSet};
 use super::significance::Significance;
-use super::subject::{ModelInCondition, is_control, is_observer};
 use darkqa_ground::types::{
     ChoiceDetail, Family, ImageFidelity, ModelListing, RunQuestion, Trials, Variant,
 };
@@ -31,7 +31,7 @@ pub struct Findings<'a> {
     pub grid: Grid<'a>,
     /// Unit that is treated as independent.
     pub unit: ClusterUnit,
-    /// Accuracies by subject, family and reading.
+    /// Accuracies by subject, family and parsing.
     pub summary: AccuracySummary,
     /// Counts of replies, unreadable replies and failures of each subject.
     pub health: Vec<Health>,
@@ -42,7 +42,7 @@ pub struct Findings<'a> {
     /// Models that the pooled findings leave out because they answered fewer items than others.
     pub left_out: Vec<ModelsLeftOut>,
     /// Test results of each claim about noise under every noise profile; empty with a single profile.
-    pub by_reading: Vec<FindingByReading>,
+    pub by_profile: Vec<FindingByProfile>,
     /// Ranking of the models by mean accuracy in the dark; `None` with fewer than two models.
     pub best: Option<BestInTheDark>,
     /// The same ranking in the lenient parsing.
@@ -107,10 +107,10 @@ impl<'a> Findings<'a> {
         let clusters = Clusters::new(trials.questions(), ties);
         let questions: Vec<OfferedChoices> = questions.into_iter().collect();
         let observer = ObserverSummary::new(trials, &clusters);
-        let is_model = |model: &str| !is_control(model);
-        let is_shown = |model: &str| is_model(model) && !is_observer(model);
         let without_observer = observer.is_hidden().then(|| {
-            let grid = Grid::for_models(trials, &clusters, listing, is_shown);
+            let grid = Grid::for_models(trials, &clusters, listing, |model| {
+                !is_control(model) && !is_observer(model)
+            });
             Box::new(Self::build(
                 grid,
                 &clusters,
@@ -119,7 +119,7 @@ impl<'a> Findings<'a> {
                 measured,
             ))
         });
-        let grid = Grid::for_models(trials, &clusters, listing, is_model);
+        let grid = Grid::for_models(trials, &clusters, listing, |model| !is_control(model));
         Self {
             without_observer,
             ..Self::build(grid, &clusters, &questions, observer, measured)
@@ -189,7 +189,7 @@ impl<'a> Findings<'a> {
             pooled,
             averaged,
             left_out: models_left_out(&grid),
-            by_reading: by_reading(&grid),
+            by_profile: by_profile(&grid),
             best: best_in_the_dark(&grid, ReadingMode::Strict),
             lenient_best: best_in_the_dark(&grid, ReadingMode::Lenient),
             comparisons: comparisons(&grid),

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use super::choice::ReadingMode;
 use super::cluster::Clusters;
 use super::estimate::ClusterCount;
-use super::subject::ModelInCondition;
+use super::model_in_condition::ModelInCondition;
 use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{
     AnswerReading, AskedItem, ChoiceDetail, Family, ModelListing, TrialOutcome, TrialRef, Trials,
@@ -340,8 +340,9 @@ impl<'a> Grid<'a> {
     /// Groups that are scored separately: all families together (`None`), then each family.
     #[must_use]
     pub fn groups(&self) -> Vec<Option<&'a Family>> {
-        let families = self.families().into_iter().map(Some);
-        std::iter::once(None).chain(families).collect()
+        std::iter::once(None)
+            .chain(self.families().into_iter().map(Some))
+            .collect()
     }
 }
 

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::cluster::Clusters;
 use super::estimate::Estimate;
-use super::subject::{ModelInCondition, is_control, is_observer};
+use super::model_in_condition::{ModelInCondition, is_control, is_observer};
 use darkqa_ground::types::replies::OBSERVER;
 use darkqa_ground::types::{
     AnswerSource, ChoiceDetail, Control, FrameId, Observed, QuestionId, TrialOutcome, TrialRef,
@@ -185,7 +185,7 @@ fn cell(
         let guess = 1.0 / trial.choices().len().max(1) as f64;
         let score = match observed.from {
             AnswerSource::Guess => guess,
-            AnswerSource::Evidence => f64::from(u8::from(trial.outcome() == TrialOutcome::Right)),
+            AnswerSource::Evidence => f64::from(trial.outcome() == TrialOutcome::Right),
         };
         let (sum, count) = &mut sums[cluster as usize];
         *sum += score;
@@ -197,12 +197,14 @@ fn cell(
         frames.insert((trial.frame(), condition.unwrap_or_default()), observed);
     }
     sums.retain(|(_, count)| *count > 0.0);
-    let sum = |of: fn(&Observed) -> usize| frames.values().map(|frame| of(frame)).sum::<usize>();
-    let things = sum(|frame| frame.things).max(1) as f64;
-    let explained: f64 = frames
-        .values()
-        .map(|frame| f64::from(frame.explained_ppm) / 1e6)
-        .sum();
+    let (mut things, mut seen, mut detected, mut explained) = (0, 0, 0, 0.0);
+    for frame in frames.values() {
+        things += frame.things;
+        seen += frame.seen;
+        detected += frame.detected;
+        explained += f64::from(frame.explained_ppm) / 1e6;
+    }
+    let things = things.max(1) as f64;
     // A guess scores exactly 1 / k and adds no noise, so only the answers from evidence count for the noise of the score.
     let max_weight = n as f64 / f64::max(evidence as f64, 1.0);
     Some(ObserverCell {
@@ -210,8 +212,8 @@ fn cell(
         score: Estimate::from_scores(&sums, max_weight, n)?,
         chance: guesses / n as f64,
         evidence: evidence as f64 / n as f64,
-        seen: sum(|frame| frame.seen) as f64 / things,
-        detected: sum(|frame| frame.detected) as f64 / things,
+        seen: seen as f64 / things,
+        detected: detected as f64 / things,
         explained: explained / frames.len() as f64,
     })
 }
@@ -248,14 +250,13 @@ mod tests {
     #[test]
     fn control_off_chance_hides_the_observer() {
         let (chance, above) = ([0.32, 0.28, 0.36], [0.34, 0.31, 0.37]);
-        let hidden = |control, in_one, over_all| summary(control, in_one, over_all).is_hidden();
         for control in ["observer:other-room", "observer:tiles (night)"] {
-            assert!(!hidden(control, chance, chance));
-            assert!(hidden(control, above, chance));
-            assert!(hidden(control, chance, above));
+            assert!(!summary(control, chance, chance).is_hidden());
+            assert!(summary(control, above, chance).is_hidden());
+            assert!(summary(control, chance, above).is_hidden());
         }
         assert!(
-            !hidden("observer:shift-4", above, above),
+            !summary("observer:shift-4", above, above).is_hidden(),
             "a limit refutes nothing"
         );
         let mut alone = summary("observer:tiles", chance, chance);

@@ -138,46 +138,34 @@ mod tests {
     use super::super::comparisons::paired::{ClusterNet, PairedTest};
     use super::*;
 
+    /// Smallest effect that one model can show in clusters of equally many questions.
+    fn detectable(clusters: usize, questions: usize, level: f64) -> Detectable {
+        PlannedSample {
+            questions: vec![questions; clusters],
+            models: 1,
+            level,
+        }
+        .detectable()
+    }
+
     #[test]
     fn independent_pairs_follow_the_formula_of_matched_pairs() {
         // n = (1.96 √ψ + 0.8416 √(ψ − δ²))² / δ² for ψ = 0.25 and δ = 0.1: 194 pairs.
-        let sample = PlannedSample {
-            questions: vec![1; 194],
-            models: 1,
-            level: 0.05,
-        };
-        let found = sample.detectable().difference.unwrap();
+        let found = detectable(194, 1, 0.05).difference.unwrap();
         assert!((found - 0.1).abs() < 0.001, "{found}");
-        assert_eq!(
-            PlannedSample {
-                questions: vec![4; 5],
-                ..sample.clone()
-            }
-            .detectable()
-            .difference,
-            None
-        );
+        assert_eq!(detectable(5, 4, 0.05).difference, None);
         // More questions of the same clusters help less than more clusters.
-        let of = |questions: Vec<usize>| {
-            let sample = PlannedSample {
-                questions,
-                ..sample.clone()
-            };
-            sample.detectable().difference.unwrap()
-        };
-        assert!(of(vec![8; 40]) > of(vec![4; 80]) && of(vec![8; 40]) < of(vec![4; 40]));
+        let [larger, more, few] = [(40, 8), (80, 4), (40, 4)]
+            .map(|(clusters, questions)| detectable(clusters, questions, 0.05).difference.unwrap());
+        assert!(larger > more && larger < few);
     }
 
     #[test]
     fn the_number_of_clusters_detects_the_target() {
-        let sample = |clusters: usize| PlannedSample {
-            questions: vec![4; clusters],
-            models: 1,
-            level: 0.01,
-        };
-        let needed = sample(42).detectable().clusters_for_target;
-        let found = |clusters: usize| sample(clusters).detectable().difference.unwrap();
-        assert!(found(needed) <= TARGET + 1e-6 && found(needed - 2) > TARGET);
+        let needed = detectable(42, 4, 0.01).clusters_for_target;
+        let [found, found_in_fewer] =
+            [needed, needed - 2].map(|clusters| detectable(clusters, 4, 0.01).difference.unwrap());
+        assert!(found <= TARGET + 1e-6 && found_in_fewer > TARGET);
     }
 
     /// Share of simulated samples in which a difference is detected. Changes of a cluster are correlated because some items take the
@@ -193,21 +181,23 @@ mod tests {
                     .questions
                     .iter()
                     .map(|items| {
-                        let change = |draw: f64| match draw {
-                            draw if draw < better => 1,
-                            draw if draw < changed => -1,
-                            _ => 0,
-                        };
                         let common = random.random_range(0.0..1.0);
                         let nets = (0..*items).map(|_| {
                             let net: i64 = (0..sample.models)
                                 .map(|_| {
                                     let is_common = random.random_bool(CORRELATION.sqrt());
-                                    change(if is_common {
+                                    let draw = if is_common {
                                         common
                                     } else {
                                         random.random_range(0.0..1.0)
-                                    })
+                                    };
+                                    if draw < better {
+                                        1
+                                    } else if draw < changed {
+                                        -1
+                                    } else {
+                                        0
+                                    }
                                 })
                                 .sum();
                             squares += (net * net) as f64;

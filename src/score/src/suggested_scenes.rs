@@ -45,27 +45,33 @@ impl SuggestedScenes {
     #[must_use]
     pub fn new<'f>(frames: impl IntoIterator<Item = &'f FrameId>) -> Option<Self> {
         let frames: BTreeSet<&str> = frames.into_iter().map(|frame| &*frame.0).collect();
-        let grouped = |by: NamedBy, key: fn(&str) -> Option<String>| {
-            let mut scenes = BTreeMap::<String, usize>::new();
-            for frame in &frames {
-                *scenes.entry(key(frame)?).or_default() += 1;
-            }
-            let found = Self {
-                scenes: scenes.len(),
-                frames: frames.len(),
-                examples: scenes.keys().take(MAX_NAMED).cloned().collect(),
-                by,
-            };
-            // At least half of the frames must share their scene; random names with equal beginnings do not reach this.
-            let shared: usize = scenes.values().filter(|count| **count > 1).sum();
-            let is_likely = scenes.len() > 1 && 2 * shared >= frames.len() && shared > 0;
-            is_likely.then_some(found)
-        };
-        let by_number =
-            || grouped(NamedBy::FileName, before_number).filter(|found| found.scenes >= MIN_SCENES);
-        grouped(NamedBy::Folder, folder)
-            .or_else(|| grouped(NamedBy::FileName, numbered_place))
-            .or_else(by_number)
+        Self::grouped(&frames, NamedBy::Folder, folder)
+            .or_else(|| Self::grouped(&frames, NamedBy::FileName, numbered_place))
+            .or_else(|| {
+                Self::grouped(&frames, NamedBy::FileName, before_number)
+                    .filter(|found| found.scenes >= MIN_SCENES)
+            })
+    }
+
+    /// Groups frames by the scene that `scene_of` finds in each name. `None` if a name has no scene or the groups are unlikely to be scenes.
+    fn grouped(
+        frames: &BTreeSet<&str>,
+        by: NamedBy,
+        scene_of: fn(&str) -> Option<String>,
+    ) -> Option<Self> {
+        let mut scenes = BTreeMap::<String, usize>::new();
+        for frame in frames {
+            *scenes.entry(scene_of(frame)?).or_default() += 1;
+        }
+        // At least half of the frames must share their scene; random names with equal beginnings do not reach this.
+        let shared: usize = scenes.values().filter(|count| **count > 1).sum();
+        let is_likely = scenes.len() > 1 && 2 * shared >= frames.len() && shared > 0;
+        is_likely.then(|| Self {
+            scenes: scenes.len(),
+            frames: frames.len(),
+            examples: scenes.keys().take(MAX_NAMED).cloned().collect(),
+            by,
+        })
     }
 
     /// The suggestion as one sentence.

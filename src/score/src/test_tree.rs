@@ -238,13 +238,11 @@ mod tests {
         let runs = 4000;
         let share = (0..runs)
             .filter(|_| {
-                let mut p = || random.random_range(0.0..1.0);
-                let set =
-                    TestTree::with_branches(p(), vec![TestTree::chain([p(), p()].into_iter())]);
+                let p: [f64; 6] = std::array::from_fn(|_| random.random_range(0.0..1.0));
                 let tree = TestTree::group([
-                    set,
-                    TestTree::leaf(p()).with_weight(0.25),
-                    TestTree::group([TestTree::leaf(p()), TestTree::leaf(p())]),
+                    TestTree::with_branches(p[0], vec![TestTree::chain([p[1], p[2]].into_iter())]),
+                    TestTree::leaf(p[3]).with_weight(0.25),
+                    TestTree::group([TestTree::leaf(p[4]), TestTree::leaf(p[5])]),
                 ]);
                 adjust_p_values(&tree, |p| p).iter().any(|(_, p)| *p < 0.05)
             })

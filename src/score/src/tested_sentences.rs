@@ -6,14 +6,14 @@ use super::answers::confusion::{AgainstClean, Confusion, FalseAnswer};
 use super::calibration::MIN_CONFIDENT_REPLIES;
 use super::choice::ReadingMode;
 use super::cluster::MIN_SCENES;
-use super::comparisons::{BestInTheDark, Comparison, ComparisonKind, PooledFinding, PooledKind};
+use super::comparisons::{BestInTheDark, ComparisonKind, PooledFinding, PooledKind};
 use super::findings::Findings;
 use super::grid::Grid;
+use super::model_in_condition::{ModelInCondition, models_under_test};
 use super::significance::ALPHA;
-use super::subject::{ModelInCondition, models_under_test};
 use super::test_tree::{TestTree, adjust_p_values};
 use darkqa_ground::types::degradations::Kind;
-use darkqa_ground::types::{AxisLevel, EnhancerName, Variant};
+use darkqa_ground::types::{EnhancerName, Variant};
 
 /// A test, with the index of its finding if several exist.
 #[derive(Debug, Clone, Copy)]
@@ -96,21 +96,7 @@ impl Findings<'_> {
 /// Tree of all tests of a report. It depends on the questions asked, never on the answers.
 fn report_tests(findings: &Findings<'_>) -> Tests {
     let sets = pooled_sets(findings);
-    let tests_of_kind = |kind: PooledKind| {
-        TestTree::group(
-            sets.iter()
-                .filter(|set| set.kind == kind)
-                .map(|set| set.tests(findings)),
-        )
-    };
-    let names: BTreeSet<&EnhancerName> = sets.iter().filter_map(|set| set.enhancer).collect();
-    let enhancers = names.into_iter().map(|name| {
-        TestTree::group(
-            sets.iter()
-                .filter(|set| set.enhancer == Some(name))
-                .map(|set| set.tests(findings)),
-        )
-    });
+    let enhancers: BTreeSet<&EnhancerName> = sets.iter().filter_map(|set| set.enhancer).collect();
     let best = findings
         .best
         .as_ref()
@@ -121,23 +107,32 @@ fn report_tests(findings: &Findings<'_>) -> Tests {
         .as_ref()
         .filter(|fidelity| fidelity.within[0].is_some());
     let further = [
-        tests_of_kind(PooledKind::Blind),
+        kind_tests(findings, &sets, PooledKind::Blind),
         below_blind(findings),
-        tests_of_kind(PooledKind::Hallucination(FalseAnswer::No)),
-        tests_of_kind(PooledKind::Hallucination(FalseAnswer::Yes)),
+        kind_tests(findings, &sets, PooledKind::Hallucination(FalseAnswer::No)),
+        kind_tests(findings, &sets, PooledKind::Hallucination(FalseAnswer::Yes)),
         collapses(findings),
         confidence(findings),
         TestTree::group(fidelity.map(|_| TestTree::leaf(Test::Fidelity))),
     ];
-    let main = [tests_of_kind(PooledKind::Darkness)]
+    let main = [kind_tests(findings, &sets, PooledKind::Darkness)]
         .into_iter()
-        .chain(enhancers)
+        .chain(enhancers.into_iter().map(|name| {
+            let own = sets.iter().filter(|set| set.enhancer == Some(name));
+            TestTree::group(own.map(|set| set.tests(findings)))
+        }))
         .chain([TestTree::group(best.into_iter().flatten())])
         .chain(photographs(findings));
     TestTree::group(main.map(|branch| branch.with_weight(MAIN)).chain([
-        tests_of_kind(PooledKind::Noise).with_weight(NOISE),
+        kind_tests(findings, &sets, PooledKind::Noise).with_weight(NOISE),
         TestTree::group(further).with_weight(FURTHER),
     ]))
+}
+
+/// Tests of the sets of one kind.
+fn kind_tests(findings: &Findings<'_>, sets: &[PooledSet<'_>], kind: PooledKind) -> Tests {
+    let own = sets.iter().filter(|set| set.kind == kind);
+    TestTree::group(own.map(|set| set.tests(findings)))
 }
 
 /// True for a main variant: it has the last degradation kind of its root, or no kind. Sentences about all other variants are limited to
@@ -210,44 +205,31 @@ impl PooledSet<'_> {
                     && mean.enhancer.as_ref() == self.enhancer
             })
             .collect();
-        let level_tests = |levels: &[(usize, &PooledFinding)]| -> Vec<Test> {
-            levels
-                .iter()
-                .map(|(index, _)| Test::Pooled(*index))
-                .collect()
-        };
         if self.kind.grows_with_the_level() {
             let means = averaged.iter().map(|(index, _)| Test::Averaged(*index));
-            let mut levels = level_tests(&self.levels);
-            levels.reverse();
-            let chain: Vec<Test> = means.chain(levels).collect();
-            return TestTree::chain(chain.into_iter()).with_weight(weight);
+            let levels = self.levels.iter().map(|(index, _)| Test::Pooled(*index));
+            return TestTree::chain(means.chain(levels.rev())).with_weight(weight);
         }
-        let is_severe = |(_, finding): &(usize, &PooledFinding)| finding.is_severe();
-        let (severe, mild): (Vec<_>, Vec<_>) = self.levels.iter().copied().partition(is_severe);
-        let mean = |is_severe: bool| {
-            averaged
+        let branches = [true, false].map(|is_severe| {
+            let mean = averaged
                 .iter()
                 .find(|(_, mean)| mean.is_severe() == is_severe)
-                .map(|(index, _)| Test::Averaged(*index))
-        };
-        let mut severe_tests = level_tests(&severe);
-        severe_tests.reverse();
-        let branch = |mean: Option<Test>, levels: Vec<Test>| match mean {
-            Some(mean) => TestTree::chain(
-                [mean]
-                    .into_iter()
-                    .chain(levels)
-                    .collect::<Vec<_>>()
-                    .into_iter(),
-            ),
-            None => TestTree::group(levels.into_iter().map(TestTree::leaf)),
-        };
-        TestTree::group([
-            branch(mean(true), severe_tests),
-            branch(mean(false), level_tests(&mild)),
-        ])
-        .with_weight(weight)
+                .map(|(index, _)| Test::Averaged(*index));
+            let mut levels: Vec<Test> = self
+                .levels
+                .iter()
+                .filter(|(_, finding)| finding.is_severe() == is_severe)
+                .map(|(index, _)| Test::Pooled(*index))
+                .collect();
+            if is_severe {
+                levels.reverse();
+            }
+            match mean {
+                Some(mean) => TestTree::chain([mean].into_iter().chain(levels)),
+                None => TestTree::group(levels.into_iter().map(TestTree::leaf)),
+            }
+        });
+        TestTree::group(branches).with_weight(weight)
     }
 }
 
@@ -290,20 +272,20 @@ fn photographs(findings: &Findings<'_>) -> Vec<Tests> {
     ];
     kinds
         .map(|kind| {
-            let is_stated = |comparison: &Comparison| {
-                comparison.kind == kind
-                    && comparison.family.is_none()
-                    && comparison.first.variant.photograph().is_some()
-                    && (comparison.first.enhancer.is_none() || kind == ComparisonKind::RealEnhanced)
-                    && models.contains(&*comparison.first.model)
-                    && comparison.strict.significance.is_possible()
-            };
             TestTree::group(
                 findings
                     .comparisons
                     .iter()
                     .enumerate()
-                    .filter(|(_, comparison)| is_stated(comparison))
+                    .filter(|(_, comparison)| {
+                        let first = &comparison.first;
+                        comparison.kind == kind
+                            && comparison.family.is_none()
+                            && first.variant.photograph().is_some()
+                            && (first.enhancer.is_none() || kind == ComparisonKind::RealEnhanced)
+                            && models.contains(&*first.model)
+                            && comparison.strict.significance.is_possible()
+                    })
                     .map(|(index, _)| TestTree::leaf(Test::Comparison(index))),
             )
         })
@@ -325,15 +307,16 @@ fn darkest<'f>(findings: &'f Findings<'_>) -> Vec<&'f ModelInCondition> {
                     .contains(&&*subject.model)
         })
         .collect();
-    let darkest_level = |variant: &Variant| -> Option<AxisLevel> {
-        raw.iter()
-            .filter(|subject| subject.variant == *variant)
-            .filter_map(|subject| subject.level)
-            .max()
-    };
     raw.iter()
         .copied()
-        .filter(|subject| subject.level == darkest_level(&subject.variant))
+        .filter(|subject| {
+            let darkest = raw
+                .iter()
+                .filter(|other| other.variant == subject.variant)
+                .filter_map(|other| other.level)
+                .max();
+            subject.level == darkest
+        })
         .collect()
 }
 

@@ -1,14 +1,14 @@
 //! Tests of the findings over all models, [`super::comparisons`], on synthetic records.
 
-use super::answers::confusion::{FalseAnswer, confusions};
+use super::answers::confusion::{Collapse, FalseAnswer, confusions};
 use super::choice::ReadingMode;
 use super::cluster::{Clusters, FrameTies};
 use super::comparisons::paired::PairedComparison;
 use super::comparisons::{PooledFinding, PooledKind, best_in_the_dark, pooled};
 use super::findings::Findings;
 use super::grid::Grid;
+use super::model_in_condition::ModelInCondition;
 use super::significance::Significance;
-use super::subject::ModelInCondition;
 use darkqa_ground::types::{
     AnswerReading, ChoiceDetail, Condition, Digest, Family, FrameId, QuestionId, Record,
     TrialOutcome,
@@ -106,8 +106,11 @@ fn one_model_pooled_is_its_own_comparison() {
         );
         assert_eq!(darkest.strict.verdict, Significance::Worse);
         // By family the clusters are the same, and the sets are corrected apart.
-        let by_family = findings.iter().filter(|finding| finding.family.is_some());
-        assert_eq!(by_family.count(), 4);
+        let by_family = findings
+            .iter()
+            .filter(|finding| finding.family.is_some())
+            .count();
+        assert_eq!(by_family, 4);
     });
 }
 
@@ -223,9 +226,8 @@ fn the_best_is_shown_better_than_every_other() {
         let names: Vec<&str> = best.models.iter().map(|model| &*model.model).collect();
         assert_eq!(names, ["good", "same", "guess"]);
         // 21 and 20 of 23 items are right in the dark; L0 does not count.
-        let mean = |index: usize| best.models[index].mean.value;
-        assert!((mean(0) - 21.0 / 23.0).abs() < 1e-12);
-        assert!((mean(1) - 20.0 / 23.0).abs() < 1e-12);
+        assert!((best.models[0].mean.value - 21.0 / 23.0).abs() < 1e-12);
+        assert!((best.models[1].mean.value - 20.0 / 23.0).abs() < 1e-12);
         let loss = best.models[0].loss.unwrap().value;
         assert!((loss + 2.0 / 23.0).abs() < 1e-12);
         assert_eq!(best.models[2].loss, None);
@@ -257,13 +259,12 @@ fn below_blind_is_what_the_corrected_test_shows() {
     .concat();
     let trials = records.iter().cloned().collect();
     let findings = Findings::new(&trials, &FrameTies::default(), [], &[]);
-    let below = |condition: &str| {
+    let [two_points_less, dark] = ["L3-noise", "L5-noise"].map(|condition| {
         let condition: Condition = condition.parse().unwrap();
         findings.below_blind(&ModelInCondition::new("m", Some(&condition)), None)
-    };
-    // Two points less are below, and not shown to be.
-    assert!(below("L3-noise").is_empty());
-    assert_eq!(below("L5-noise"), ["m"]);
+    });
+    assert!(two_points_less.is_empty(), "a difference, but not detected");
+    assert_eq!(dark, ["m"]);
 }
 
 /// Records of a model about presence, two questions a frame: an object is present in the first, and absent in the second. `reply` gives the
@@ -295,14 +296,13 @@ fn false_answers_are_the_other_word_and_not_a_missing_one() {
     .concat();
     with_grid(&all[..6 * FRAMES], |grid| {
         let (findings, _) = pooled(grid);
-        let of = |answer: FalseAnswer| -> Vec<&PooledFinding> {
+        let [said_no, said_yes] = [FalseAnswer::No, FalseAnswer::Yes].map(|answer| {
             let kind = PooledKind::Hallucination(answer);
             findings
                 .iter()
                 .filter(|finding| finding.kind == kind)
-                .collect()
-        };
-        let said_no = of(FalseAnswer::No);
+                .collect::<Vec<&PooledFinding>>()
+        });
         assert_eq!(said_no.len(), 2);
         let (dark, darkest) = (said_no[0], said_no[1]);
         assert_eq!(dark.family, Some(Family::Presence));
@@ -314,7 +314,6 @@ fn false_answers_are_the_other_word_and_not_a_missing_one() {
         assert!((dark.p - 2.0 / 1024.0).abs() < 1e-12 && (dark.holm - 2.0 * dark.p).abs() < 1e-12);
         assert_eq!(dark.verdict, Significance::Worse);
         assert!((darkest.first - 0.0).abs() < 1e-12 && darkest.verdict == Significance::NotShown);
-        let said_yes = of(FalseAnswer::Yes);
         let said_yes = &said_yes[0].strict;
         assert!((said_yes.first - 1.0 / 12.0).abs() < 1e-12 && said_yes.second < 1e-12);
         assert_eq!(said_yes.verdict, Significance::NotShown);
@@ -332,16 +331,17 @@ fn false_answers_are_the_other_word_and_not_a_missing_one() {
     });
 }
 
+/// The most frequent answer of a model to 24 questions, to four of which it is true.
+fn collapse(reply: fn(usize, bool) -> Option<bool>) -> Collapse {
+    let mut all = presence("m", "L3-noise", reply);
+    for (item, record) in all.iter_mut().enumerate() {
+        record.detail.truth = Some(usize::from(item % 2 == 1 || item > 7));
+    }
+    with_grid(&all, |grid| confusions(grid)[0].collapse.clone().unwrap())
+}
+
 #[test]
 fn a_collapse_is_more_than_its_truth_and_more_than_a_guess() {
-    let collapse = |reply: fn(usize, bool) -> Option<bool>| {
-        let mut all = presence("m", "L3-noise", reply);
-        // Something is there in four of 24 questions alone.
-        for (item, record) in all.iter_mut().enumerate() {
-            record.detail.truth = Some(usize::from(item % 2 == 1 || item > 7));
-        }
-        with_grid(&all, |grid| confusions(grid)[0].collapse.clone().unwrap())
-    };
     let all = collapse(|_, _| Some(true));
     assert_eq!((&*all.top, all.share.n, all.clusters), ("Yes", 24, 12));
     assert!((all.share.value - 1.0).abs() < 1e-12 && (all.truth - 4.0 / 24.0).abs() < 1e-12);

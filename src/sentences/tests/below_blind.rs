@@ -10,8 +10,8 @@ use darkqa_score::comparisons::{
     Comparison, ComparisonKind, PooledFinding, PooledKind, TestedComparison,
 };
 use darkqa_score::estimate::Estimate;
+use darkqa_score::model_in_condition::ModelInCondition;
 use darkqa_score::significance::Significance::{self, Better, NotShown, Worse};
-use darkqa_score::subject::ModelInCondition;
 
 /// A comparison of `model` with images and `other` without, in a family.
 fn against_blind(

@@ -7,7 +7,7 @@ use crate::types::{AxisLevel, Severity, Variant};
 use darkqa_score::calibration::{Calibration, RiskCoverage, TestedConfidence};
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::estimate::Estimate;
-use darkqa_score::subject::ModelInCondition;
+use darkqa_score::model_in_condition::ModelInCondition;
 
 fn around(value: f64) -> Estimate {
     Estimate {

@@ -17,8 +17,8 @@ use darkqa_score::cluster::{Clusters, FrameTies};
 use darkqa_score::comparisons::{PooledKind, baseline_rows};
 use darkqa_score::findings::Findings;
 use darkqa_score::grid::Grid;
+use darkqa_score::model_in_condition::ModelInCondition;
 use darkqa_score::significance::Significance;
-use darkqa_score::subject::ModelInCondition;
 
 /// The design of a simulated run, and its true effects.
 #[derive(Debug, Clone, Copy)]
@@ -235,7 +235,7 @@ fn simulate(design: &Design, runs: usize, seed: u64) -> Counts {
                 .any(|finding| finding.strict.verdict.is_shown()),
         );
         let is_decided = findings
-            .by_reading
+            .by_profile
             .iter()
             .any(|finding| finding.robustness.word() != "open");
         counts.decided += usize::from(is_decided);

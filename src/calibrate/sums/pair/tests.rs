@@ -33,17 +33,18 @@ fn frame(layout: Layout, seed: u64, level: u16, spread: u32) -> Vec<u16> {
 /// Noise by its definition, with loops over sites, for a pair of frames without hot pixels.
 fn noise_by_sites(layout: Layout, a: &[u16], b: &[u16]) -> [f64; 2] {
     let planes = layout.cfa.planes();
-    let plane = |site: usize| {
-        let (row, column) = (site / layout.width, site % layout.width);
-        layout.cfa.plane(row, column % layout.cfa.step())
-    };
     let mut d: Vec<f64> = a
         .iter()
         .zip(b)
         .map(|(a, b)| f64::from(*a) - f64::from(*b))
         .collect();
     for wanted in 0..planes {
-        let sites: Vec<usize> = (0..d.len()).filter(|site| plane(*site) == wanted).collect();
+        let sites: Vec<usize> = (0..d.len())
+            .filter(|site| {
+                let (row, column) = (site / layout.width, site % layout.width);
+                layout.cfa.plane(row, column % layout.cfa.step()) == wanted
+            })
+            .collect();
         let mean = sites.iter().map(|site| d[*site]).sum::<f64>() / sites.len() as f64;
         for site in &sites {
             d[*site] -= mean;
@@ -111,7 +112,6 @@ fn hot_pixels_are_left_out() {
         .collect();
     let hot = HotPixels::new(columns);
     let clean = PairSums::new(BAYER, [&a, &b], &hot);
-    let correlation = |sums: &PairSums| sums.neighbours().correlation(&[1.0; 4]);
     let (tiles, noise) = (clean.tiles(), clean.noise());
     for plane_row in [0, 5] {
         let [row, parity] = BAYER.place(plane_row);
@@ -122,7 +122,8 @@ fn hot_pixels_are_left_out() {
     let spoiled = PairSums::new(BAYER, [&a, &b], &hot);
     assert_eq!(spoiled.tiles(), tiles);
     assert_eq!(spoiled.noise(), noise);
-    assert!((correlation(&spoiled) - correlation(&clean)).abs() < 1e-15);
+    let [spoiled, clean] = [spoiled, clean].map(|sums| sums.neighbours().correlation(&[1.0; 4]));
+    assert!((spoiled - clean).abs() < 1e-15);
     // Control: without the mask, hot pixels do affect the sums.
     let unmasked = PairSums::new(BAYER, [&a, &b], &HotPixels::none(BAYER.plane_rows()));
     assert!(unmasked.noise().within > 1000.0 * noise.within);
@@ -137,20 +138,18 @@ fn smoothing_causes_correlation() {
         ..BAYER
     };
     let hot = HotPixels::none(layout.plane_rows());
-    let (a, b) = (frame(layout, 9, 500, 90), frame(layout, 10, 500, 90));
-    let correlation = |a: &[u16], b: &[u16]| {
-        let sums = PairSums::new(layout, [a, b], &hot);
-        sums.neighbours().correlation(&[1.0; 4])
-    };
-    let plain = correlation(&a, &b);
-    assert!(plain.abs() < 0.015, "{plain}");
-    let smooth = |frame: &[u16]| -> Vec<u16> {
-        frame
+    let frames = [9, 10].map(|seed| frame(layout, seed, 500, 90));
+    let smoothed: [Vec<u16>; 2] = [0, 1].map(|i: usize| {
+        frames[i]
             .chunks(layout.width)
             .flat_map(|row| (0..row.len()).map(|x| row[x].midpoint(row[(x + 2) % row.len()])))
             .collect()
-    };
-    let smoothed = correlation(&smooth(&a), &smooth(&b));
+    });
+    let [plain, smoothed] = [frames, smoothed].map(|[a, b]| {
+        let sums = PairSums::new(layout, [&a, &b], &hot);
+        sums.neighbours().correlation(&[1.0; 4])
+    });
+    assert!(plain.abs() < 0.015, "{plain}");
     assert!((smoothed - 0.5).abs() < 0.02, "{smoothed}");
 }
 
@@ -181,14 +180,13 @@ fn tiles_have_local_light_and_noise() {
     let variance = mean_variance(&tiles, 1.0);
     assert!((variance - 30.0).abs() < 2.0, "{variance}");
     // Row offsets do not change the variance.
-    let rows = |frame: &[u16], seed: u64| -> Vec<u16> {
+    let shifted: [Vec<u16>; 2] = [(&lit[0], 13), (&lit[1], 14)].map(|(frame, seed)| {
         frame
             .chunks(BAYER.width)
             .zip(Numbers(seed))
             .flat_map(|(row, number)| row.iter().map(move |code| code + (number % 90) as u16))
             .collect()
-    };
-    let shifted = [rows(&lit[0], 13), rows(&lit[1], 14)];
+    });
     let shifted = PairSums::new(BAYER, [&shifted[0], &shifted[1]], &hot).tiles();
     for (tile, shifted) in tiles.iter().zip(&shifted) {
         assert!((tile.variance(1.0) - shifted.variance(1.0)).abs() < 1e-6);
@@ -209,15 +207,16 @@ fn light_patterns_cancel_with_the_ratio_of_light() {
         ..BAYER
     };
     let hot = HotPixels::none(layout.plane_rows());
-    let light = |site: usize| 4000.0 + 20.0 * (site % layout.width) as f64;
-    let lit = |seed: u64, factor: f64| -> Vec<u16> {
+    let [a, b]: [Vec<u16>; 2] = [(15, 1.0), (16, 1.05)].map(|(seed, factor)| {
         frame(layout, seed, 500, 9)
             .into_iter()
             .enumerate()
-            .map(|(site, code)| code + (factor * light(site)).round() as u16)
+            .map(|(site, code)| {
+                let light = 4000.0 + 20.0 * (site % layout.width) as f64;
+                code + (factor * light).round() as u16
+            })
             .collect()
-    };
-    let (a, b) = (lit(15, 1.0), lit(16, 1.05));
+    });
     let sums = PairSums::new(layout, [&a, &b], &hot);
     let (tiles, neighbours) = (sums.tiles(), sums.neighbours());
     let ratio = 1.0 / 1.05;

@@ -76,14 +76,14 @@ impl Observation {
         let book = rules.book();
         let is_thing = |segment: &&Segment| !book.has_flag(&segment.class, ClassFlag::Structural);
         let has_things = self.frame.segments.iter().any(|segment| is_thing(&segment));
-        let area = |segments: &[Segment]| -> u64 {
-            segments
-                .iter()
-                .filter(|segment| !has_things || is_thing(segment))
-                .map(|segment| segment.area)
-                .sum()
-        };
-        let (seen, all) = (area(&self.statistics.segments), area(&self.frame.segments));
+        let [seen, all] =
+            [&self.statistics.segments, &self.frame.segments].map(|segments| -> u64 {
+                segments
+                    .iter()
+                    .filter(|segment| !has_things || is_thing(segment))
+                    .map(|segment| segment.area)
+                    .sum()
+            });
         all > 0 && 2 * seen >= all
     }
 

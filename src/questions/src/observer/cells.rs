@@ -200,8 +200,9 @@ mod tests {
     #[test]
     fn cells_count_every_pixel_at_every_scale() {
         let [width, height] = [37, 29];
-        let mask = |i: usize| (i % width / 9 + i / width / 11) as u32 % 3;
-        let masks: Vec<u32> = (0..width * height).map(mask).collect();
+        let masks: Vec<u32> = (0..width * height)
+            .map(|i: usize| (i % width / 9 + i / width / 11) as u32 % 3)
+            .collect();
         let cells = Cells::from_masks(&masks, [width, height]);
         assert_eq!(cells.side, 4);
         assert_eq!(cells.mask_of_pixels(), masks);

@@ -213,10 +213,12 @@ mod tests {
 
     /// The fit of a row of grey pixels.
     fn fit(untouched: &[u8], received: &[u8]) -> Fit {
-        let grey = |codes: &[u8]| -> Vec<u8> { codes.iter().flat_map(|code| [*code; 3]).collect() };
-        let untouched = Rgb::new(1, untouched.len(), grey(untouched)).unwrap();
+        let [untouched, received] = [untouched, received].map(|codes| {
+            let samples = codes.iter().flat_map(|code| [*code; 3]).collect();
+            Rgb::new(1, codes.len(), samples).unwrap()
+        });
         let tiles = Tiles::new(&untouched, 16);
-        let sums = tiles.sums(untouched.samples(), &grey(received));
+        let sums = tiles.sums(untouched.samples(), received.samples());
         Fit::whole(&tiles, &sums)
     }
 

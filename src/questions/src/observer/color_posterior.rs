@@ -218,11 +218,11 @@ impl ColorPosterior {
     fn most_probable(&self, palette: &Palette, offered: &[Color]) -> Option<Color> {
         let mut masses = vec![0.0; offered.len()];
         let [red, green, blue] = &self.0;
-        let code = |block: usize| (block * (256 / BLOCKS)) as u8;
         for (r, red) in red.blocks.iter().enumerate() {
             for (g, green) in green.blocks.iter().enumerate() {
                 for (b, blue) in blue.blocks.iter().enumerate() {
-                    let color = palette.color([code(r), code(g), code(b)]);
+                    let color =
+                        palette.color([r, g, b].map(|block| (block * (256 / BLOCKS)) as u8));
                     if let Some(index) = offered.iter().position(|other| Some(*other) == color) {
                         masses[index] += red * green * blue;
                     }
@@ -248,12 +248,14 @@ impl Posterior {
         let error =
             DEVIATION_PER_MAD * median(&mut distances) * MEDIAN_ERROR / (means.len() as f64).sqrt();
         let variance = ROUNDING / (gain * gain) + error * error;
-        let distance = |code: usize| (middle - fit.curve[code]) * (middle - fit.curve[code]);
-        let mut likelihood: [f64; 256] =
-            std::array::from_fn(|code| libm::exp(-0.5 * distance(code) / variance));
+        let distances: [f64; 256] = std::array::from_fn(|code| {
+            let difference = middle - fit.curve[code];
+            difference * difference
+        });
+        let mut likelihood = distances.map(|distance| libm::exp(-0.5 * distance / variance));
         let mut sum: f64 = likelihood.iter().sum();
         if sum <= 1e-12 {
-            let nearest = (0..256).min_by(|a, b| distance(*a).total_cmp(&distance(*b)));
+            let nearest = (0..256).min_by(|a, b| distances[*a].total_cmp(&distances[*b]));
             likelihood = [0.0; 256];
             likelihood[nearest.unwrap_or(0)] = 1.0;
             sum = 1.0;
@@ -261,14 +263,12 @@ impl Posterior {
         for value in &mut likelihood {
             *value /= sum;
         }
-        let codes = || {
-            likelihood
-                .iter()
-                .zip(0_u16..)
-                .map(|(p, code)| (p, f64::from(code)))
-        };
-        let mean: f64 = codes().map(|(p, code)| p * code).sum();
-        let variance: f64 = codes()
+        let codes = likelihood
+            .iter()
+            .zip(0_u16..)
+            .map(|(p, code)| (p, f64::from(code)));
+        let mean: f64 = codes.clone().map(|(p, code)| p * code).sum();
+        let variance: f64 = codes
             .map(|(p, code)| p * (code - mean) * (code - mean))
             .sum();
         let (blocks, _) = likelihood.as_chunks::<{ 256 / BLOCKS }>();

@@ -191,21 +191,22 @@ impl Moments {
 
 /// Moments of each tile and channel.
 fn moments(tiles: &Tiles, sums: &TileSums, curves: &[[f64; CODES]; 3]) -> Vec<[Moments; 3]> {
-    let channel_moments = |tile: usize, channel: usize| {
-        let mut moments = Moments::default();
-        for same in tiles.by_code(sums, tile, channel) {
-            let predicted = curves[channel][same.code];
-            moments.pixels += same.count;
-            moments.predicted += predicted * same.count;
-            moments.power += predicted * predicted * same.count;
-            moments.received += same.received;
-            moments.squares += same.squares;
-            moments.product += predicted * same.received;
-        }
-        moments
-    };
     (0..tiles.len())
-        .map(|tile| [0, 1, 2].map(|channel| channel_moments(tile, channel)))
+        .map(|tile| {
+            [0, 1, 2].map(|channel| {
+                let mut moments = Moments::default();
+                for same in tiles.by_code(sums, tile, channel) {
+                    let predicted = curves[channel][same.code];
+                    moments.pixels += same.count;
+                    moments.predicted += predicted * same.count;
+                    moments.power += predicted * predicted * same.count;
+                    moments.received += same.received;
+                    moments.squares += same.squares;
+                    moments.product += predicted * same.received;
+                }
+                moments
+            })
+        })
         .collect()
 }
 

@@ -72,11 +72,12 @@ pub(super) fn patch_sums(
     fit: &Fit,
     image: &Rgb,
 ) -> Vec<PatchSums> {
-    // The conversion to an integer saturates; curves exceed its range only in light near 0.
-    let fixed = |value: f64| (value * FIXED + 0.5) as u32;
     let tables: [[[u32; 2]; 256]; 3] = [0, 1, 2].map(|channel| {
         let fit = &fit.channels[channel];
-        std::array::from_fn(|code| [fixed(fit.curve[code]), fixed(fit.variance[code])])
+        // The conversion to an integer saturates; curves exceed its range only in light near 0.
+        std::array::from_fn(|code| {
+            [fit.curve[code], fit.variance[code]].map(|value| (value * FIXED + 0.5) as u32)
+        })
     });
     let mut sums = vec![PatchSums::default(); cells.scales[0].patches.len()];
     let (mut untouched, _) = untouched.as_chunks::<3>();
@@ -239,13 +240,14 @@ fn filters(scale: &Scale, smallest: &[PatchSums], tiles: &[TileFit]) -> Vec<Matc
             contrast(element, inside, cell, &tiles[element.tile])
         })
         .collect();
-    let elements = || scale.elements.iter().zip(&contrasts);
+    let elements = scale.elements.iter().zip(&contrasts);
     let excess = [false, true].map(|is_disturbed| {
-        let alike =
-            elements().filter(|(element, _)| tiles[element.tile].is_disturbed == is_disturbed);
+        let alike = elements
+            .clone()
+            .filter(|(element, _)| tiles[element.tile].is_disturbed == is_disturbed);
         [0, 1, 2].map(|channel| excess(alike.clone().map(|(_, contrast)| contrast[channel])))
     });
-    elements()
+    elements
         .map(|(element, contrast)| {
             let excess = excess[usize::from(tiles[element.tile].is_disturbed)];
             let mut filter = MatchedFilter::default();

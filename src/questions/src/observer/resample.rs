@@ -53,23 +53,17 @@ mod tests {
 
     #[test]
     fn pixel_is_the_mean_of_its_area() {
-        let image = |codes: &[u8], width: usize| {
-            let samples: Vec<u8> = codes.iter().flat_map(|code| [*code; 3]).collect();
-            Rgb::new(codes.len() / width, width, samples).unwrap()
-        };
-        let codes =
-            |image: &Rgb| -> Vec<u8> { image.samples().iter().step_by(3).copied().collect() };
-        for (from, size, expected) in [
-            (image(&[0, 30, 60], 3), [2, 1], vec![10, 50]),
-            (image(&[0, 30, 60], 3), [6, 1], vec![0, 0, 30, 30, 60, 60]),
-            (image(&[0, 10, 20, 31], 2), [1, 1], vec![15]),
-            (
-                image(&[0, 10, 20, 30], 2),
-                [2, 3],
-                vec![0, 10, 10, 20, 20, 30],
-            ),
+        for (codes, width, size, expected) in [
+            (vec![0, 30, 60], 3, [2, 1], vec![10, 50]),
+            (vec![0, 30, 60], 3, [6, 1], vec![0, 0, 30, 30, 60, 60]),
+            (vec![0, 10, 20, 31], 2, [1, 1], vec![15]),
+            (vec![0, 10, 20, 30], 2, [2, 3], vec![0, 10, 10, 20, 20, 30]),
         ] {
-            assert_eq!(codes(&area_mean(&from, size)), expected);
+            let samples = codes.iter().flat_map(|code| [*code; 3]).collect();
+            let image = Rgb::new(codes.len() / width, width, samples).unwrap();
+            let resized = area_mean(&image, size);
+            let codes: Vec<u8> = resized.samples().iter().step_by(3).copied().collect();
+            assert_eq!(codes, expected);
         }
     }
 }

@@ -36,8 +36,10 @@ fn discs(columns: usize, radius: f64) -> Vec<u32> {
         .map(|i: usize| {
             let (x, y) = (i % width, i / width);
             let (column, row) = (x / side, y / side);
-            let middle = |at: usize| (at * side) as f64 + side as f64 / 2.0 - 0.5;
-            let (dx, dy) = (x as f64 - middle(column), y as f64 - middle(row));
+            let [dx, dy] = [(x, column), (y, row)].map(|(at, cell)| {
+                let middle = (cell * side) as f64 + side as f64 / 2.0 - 0.5;
+                at as f64 - middle
+            });
             let is_inside = dx * dx + dy * dy < radius * radius;
             let is_inside = is_inside && column < columns && (row + 1) * side <= height;
             if is_inside {
@@ -169,18 +171,21 @@ fn contrast_is_seen_if_it_is_the_predicted_one() {
 #[test]
 fn less_than_half_of_the_predicted_contrast_is_not_confirmed() {
     let masks = discs(4, 22.0);
-    let code = |mask: u32| {
-        if mask > 1 && mask.is_multiple_of(2) {
-            180.0
-        } else {
-            100.0
-        }
-    };
-    let untouched = image(|i| code(masks[i]));
+    let codes: Vec<f64> = masks
+        .iter()
+        .map(|mask| {
+            if *mask > 1 && mask.is_multiple_of(2) {
+                180.0
+            } else {
+                100.0
+            }
+        })
+        .collect();
+    let untouched = image(|i| codes[i]);
     for (share, expected) in [(1.0, true), (0.8, true), (0.3, false), (0.0, false)] {
         let received = image(|i| {
             let own = if masks[i] == 2 { share } else { 1.0 };
-            100.0 + own * (code(masks[i]) - 100.0)
+            100.0 + own * (codes[i] - 100.0)
         });
         let found = observe(&masks, &untouched, &in_noise(&received, 4.0, 1))[2];
         assert_eq!(found.confirmed >= 0.5, expected, "{share}: {found:?}");
@@ -222,15 +227,10 @@ fn noise_alone_shows_nothing() {
     assert!(things >= 10_000, "{things}");
     // Twice the rate of false alarms that the tests allow. The noise that an outline shares is measured from the twelve outlines of
     // the image, so that the z of a whole outline has the tails of Student's distribution; it decides no answer.
-    let most = |rate: f64| (rate * f64::from(things)) as u32;
-    assert!(
-        seen.iter().sum::<u32>() <= most(0.002),
-        "{seen:?} of {things}"
-    );
-    assert!(
-        detected.iter().sum::<u32>() <= most(0.005),
-        "{detected:?} of {things}"
-    );
+    for (found, rate) in [(seen, 0.002), (detected, 0.005)] {
+        let max = (rate * f64::from(things)) as u32;
+        assert!(found.iter().sum::<u32>() <= max, "{found:?} of {things}");
+    }
 }
 
 #[test]

@@ -47,29 +47,27 @@ impl RuleBook {
         Ok(())
     }
 
+    fn check_defined(&self, place: &str, class: &str) -> Result<(), String> {
+        if self.class.contains_key(class) {
+            return Ok(());
+        }
+        Err(format!(
+            "{place} names the class {class:?}, which [class] does not define"
+        ))
+    }
+
     fn check_classes(&self) -> Result<(), String> {
-        let unknown = |place: &str, class: &str| {
-            Err(format!(
-                "{place} names the class {class:?}, which [class] does not define"
-            ))
-        };
         for group in &self.confusable {
             for class in &group.classes {
-                if !self.class.contains_key(class) {
-                    return unknown("confusable", class);
-                }
+                self.check_defined("confusable", class)?;
             }
         }
         for class in self.names.unlike.keys() {
-            if !self.class.contains_key(class) {
-                return unknown("names.unlike", class);
-            }
+            self.check_defined("names.unlike", class)?;
         }
         for token in &self.token {
-            if let Some(class) = &token.class
-                && !self.class.contains_key(class)
-            {
-                return unknown("token", class);
+            if let Some(class) = &token.class {
+                self.check_defined("token", class)?;
             }
             if token.class.is_none() && token.names.is_empty() && token.starts.is_empty() {
                 return Err(format!(
@@ -102,13 +100,14 @@ impl RuleBook {
                 ));
             }
         }
-        let mut named = self
+        let unknown = self
             .words
             .plural
             .iter()
             .chain(&self.words.an)
-            .chain(self.words.spelled.values());
-        match named.find(|word| !known.contains(word.as_str())) {
+            .chain(self.words.spelled.values())
+            .find(|word| !known.contains(word.as_str()));
+        match unknown {
             Some(word) => Err(format!("[words] has {word:?}, which no class has")),
             None => Ok(()),
         }

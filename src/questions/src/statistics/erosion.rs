@@ -87,8 +87,11 @@ fn run_length<T: PartialEq>(values: &[T]) -> Option<usize> {
             .iter()
             .take_while(|lanes| count_different(lanes) == 0)
             .count();
-    let rest = values[whole..].iter();
-    Some(whole + rest.take_while(|value| *value == first).count())
+    let rest = values[whole..]
+        .iter()
+        .take_while(|value| *value == first)
+        .count();
+    Some(whole + rest)
 }
 
 #[cfg(test)]
@@ -99,21 +102,14 @@ mod tests {
 
     /// The core mask of each pixel, computed pixel by pixel.
     fn reference(masks: &[u32], [width, height]: [usize; 2], radius: usize) -> Vec<u32> {
-        let at = |x: usize, y: usize| masks[y * width + x];
-        let whole = |x: usize, y: usize| {
-            let rows = y.saturating_sub(radius)..=(y + radius).min(height - 1);
-            rows.flat_map(|j| {
-                (x.saturating_sub(radius)..=(x + radius).min(width - 1)).map(move |i| (i, j))
-            })
-            .all(|(i, j)| at(i, j) == at(x, y))
-        };
         (0..width * height)
             .map(|i| {
-                if whole(i % width, i / width) {
-                    masks[i]
-                } else {
-                    0
-                }
+                let (x, y) = (i % width, i / width);
+                let columns = x.saturating_sub(radius)..=(x + radius).min(width - 1);
+                let mut rows = y.saturating_sub(radius)..=(y + radius).min(height - 1);
+                let is_core =
+                    rows.all(|y| columns.clone().all(|x| masks[y * width + x] == masks[i]));
+                if is_core { masks[i] } else { 0 }
             })
             .collect()
     }

@@ -54,17 +54,16 @@ fn depth_quantiles(mut depths: Vec<u32>) -> Option<SegmentDepth> {
     let [near, middle, far] = [10, 50, 90].map(|percent| rank(count, percent) as usize);
     // The values before the median are smaller and those after it larger, so each outer quantile is searched in its half only.
     let (nearer, &mut median, farther) = depths.select_nth_unstable(middle);
-    let ranked = |depths: &mut [u32], rank| *depths.select_nth_unstable(rank).1;
     Some(SegmentDepth {
         valid: count,
         p10: if near < middle {
-            ranked(nearer, near)
+            *nearer.select_nth_unstable(near).1
         } else {
             median
         },
         median,
         p90: match far.checked_sub(middle + 1) {
-            Some(far) => ranked(farther, far),
+            Some(far) => *farther.select_nth_unstable(far).1,
             None => median,
         },
     })
@@ -99,16 +98,16 @@ pub(super) struct PixelLight<'a> {
 impl<'a> PixelLight<'a> {
     pub(super) fn new(frame: &'a Frame, rule: &'a MeasureRule, palette: &'a Palette) -> Self {
         let slopes = depth_conversion(frame).map(|camera| {
-            let square = |length: usize, focal: f64, center: f64| -> Vec<f64> {
+            [
+                (frame.rgb.width(), camera.fx, camera.cx),
+                (frame.rgb.height(), camera.fy, camera.cy),
+            ]
+            .map(|(length, focal, center)| {
                 (0..length)
                     .map(|i| (i as f64 - center) / focal)
                     .map(|slope| slope * slope)
                     .collect()
-            };
-            [
-                square(frame.rgb.width(), camera.fx, camera.cx),
-                square(frame.rgb.height(), camera.fy, camera.cy),
-            ]
+            })
         });
         Self {
             frame,

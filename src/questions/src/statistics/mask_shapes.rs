@@ -53,7 +53,6 @@ fn count_rim(
     let [Some(above), Some(below)] = rows else {
         return (to - from) as u64;
     };
-    let differs = |x: usize| above[x] != mask || below[x] != mask;
     let count: u32 = above[from..to]
         .iter()
         .zip(&below[from..to])
@@ -62,8 +61,9 @@ fn count_rim(
     let last = (right - left > 1).then(|| right - 1);
     let ends = std::iter::once(left)
         .chain(last)
-        .filter(|x| (from..to).contains(x) && !differs(*x));
-    u64::from(count) + ends.count() as u64
+        .filter(|x| (from..to).contains(x) && above[*x] == mask && below[*x] == mask)
+        .count();
+    u64::from(count) + ends as u64
 }
 
 /// Shapes of all masks of a frame.
@@ -185,11 +185,13 @@ impl MaskShapes {
         palette: &Palette,
     ) -> Vec<Option<MaskCore>> {
         let pixels = scene.masks.len() as u64;
-        let is_large = |shape: &MaskShape| ppm(shape.area, pixels) >= rule.detail_ppm;
         let mut found: Vec<Option<MaskCore>> = self
             .list
             .iter()
-            .map(|shape| is_large(shape).then(|| MaskCore::new(shape.area, frame)))
+            .map(|shape| {
+                let is_large = ppm(shape.area, pixels) >= rule.detail_ppm;
+                is_large.then(|| MaskCore::new(shape.area, frame))
+            })
             .collect();
         let light = PixelLight::new(frame, rule, palette);
         let radius = scaled_length(scene.size[1], rule.erosion_per_height);

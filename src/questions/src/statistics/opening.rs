@@ -75,11 +75,10 @@ mod tests {
         let side = 2 * radius + 1;
         for top in 0..(height + 1).saturating_sub(side) {
             for left in 0..(width + 1).saturating_sub(side) {
-                let square = || {
-                    (top..top + side).flat_map(|y| (left..left + side).map(move |x| y * width + x))
-                };
-                if square().all(|i| set[i]) {
-                    square().for_each(|i| expected[i] = true);
+                let square =
+                    (top..top + side).flat_map(|y| (left..left + side).map(move |x| y * width + x));
+                if square.clone().all(|i| set[i]) {
+                    square.for_each(|i| expected[i] = true);
                 }
             }
         }

@@ -116,8 +116,7 @@ impl<'a> SceneMaps<'a> {
         let LabelSource::SemanticMap(ids) = &self.source else {
             return;
         };
-        let label = |id| self.label(id).wrapping_add(1);
-        self.masks = components(values(ids), self.size, label);
+        self.masks = components(values(ids), self.size, |id| self.label(id).wrapping_add(1));
         self.numbers = (1..=self.masks.iter().copied().max().unwrap_or(0)).collect();
     }
 
@@ -262,8 +261,9 @@ impl<'a> SceneMaps<'a> {
             self.size,
             scaled_length(height, rule.void_per_height),
         );
-        let count = |pixels: &[bool]| pixels.iter().filter(|void| **void).count() as u64;
-        (all, count(&void), count(&void[height / 2 * width..]))
+        let [wide, lower] = [&void[..], &void[height / 2 * width..]]
+            .map(|pixels| pixels.iter().filter(|void| **void).count() as u64);
+        (all, wide, lower)
     }
 }
 

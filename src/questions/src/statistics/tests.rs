@@ -13,11 +13,14 @@ use darkqa_ground::types::{
     DepthKind, Frame, Intrinsics, Label, Labels, Rgb, SegmentName, Segmentation,
 };
 
-fn labels() -> Labels {
-    let label = |name: &str, canonical: &str| Label {
+fn label(name: &str, canonical: &str) -> Label {
+    Label {
         name: name.into(),
         canonical: canonical.into(),
-    };
+    }
+}
+
+fn labels() -> Labels {
     Labels {
         space: "test".into(),
         void: [0].into(),
@@ -159,12 +162,12 @@ fn unknown_numbers_are_void_and_counted() {
 fn names_of_segments_override_the_words_of_labels() {
     let mut frame = frame(4, 1, vec![4, 4, 1, 1]);
     frame.segments = Some(map(4, 1, &[5_u32, 5, 70_000, 70_000]));
-    let name = |name: &str, canonical: &str| SegmentName {
-        name: name.into(),
-        canonical: canonical.into(),
+    let name = SegmentName {
+        name: "Office Chair /otherroom".into(),
+        canonical: "chair".into(),
         region: Some(3),
     };
-    frame.names = Arc::new([(5, name("Office Chair /otherroom", "chair"))].into());
+    frame.names = Arc::new([(5, name)].into());
     let found = measured(&frame);
     let chair = &found.segments[0];
     assert_eq!(
@@ -256,16 +259,20 @@ fn depth_is_along_the_ray_if_the_camera_is_known() {
 #[test]
 fn the_rim_of_a_mask_is_not_used_for_depth_and_colour() {
     let (width, height) = (12, 9);
-    let inside = |i: usize| (3..10).contains(&(i % width)) && (2..8).contains(&(i / width));
-    let ids = (0..width * height)
-        .map(|i| if inside(i) { 4 } else { 1 })
-        .collect();
-    let core = |i: usize| (4..9).contains(&(i % width)) && (3..7).contains(&(i / width));
-    let mut frame = frame(width, height, ids);
-    let samples = (0..width * height).flat_map(|i| if core(i) { [200, 30, 30] } else { [255; 3] });
+    let [inside, core]: [Vec<bool>; 2] = [(3..10, 2..8), (4..9, 3..7)].map(|(columns, rows)| {
+        (0..width * height)
+            .map(|i| columns.contains(&(i % width)) && rows.contains(&(i / width)))
+            .collect()
+    });
+    let ids = inside.iter().map(|inside| if *inside { 4 } else { 1 });
+    let mut frame = frame(width, height, ids.collect());
+    let samples = core
+        .iter()
+        .flat_map(|core| if *core { [200, 30, 30] } else { [255; 3] });
     frame.rgb = Rgb::new(height, width, samples.collect()).unwrap();
-    let depth: Vec<u32> = (0..width * height)
-        .map(|i| if core(i) { 2000 } else { 5 })
+    let depth: Vec<u32> = core
+        .iter()
+        .map(|core| if *core { 2000 } else { 5 })
         .collect();
     frame.depth = Some(map(width, height, &depth));
     let found = measured(&frame);
@@ -293,30 +300,26 @@ fn the_rim_of_a_mask_is_not_used_for_depth_and_colour() {
 fn tiny_segments_count_only_for_their_class_and_word() {
     let semantic: Vec<u16> = (0..2000).map(|i| if i == 0 { 4 } else { 1 }).collect();
     let frame = frame(2000, 1, semantic);
-    let listed = |ppm: &str| {
-        let found = measured_by(
-            &frame,
-            &rules("detail_ppm = 500", &format!("detail_ppm = {ppm}")),
-        );
-        (
-            found.segments.len(),
-            found.class_pixels("chair"),
-            found.words.contains_key("chair"),
-        )
-    };
-    assert_eq!(listed("500"), (2, 1, true));
-    assert_eq!(listed("501"), (1, 1, true));
+    for (ppm, segments) in [("500", 2), ("501", 1)] {
+        let rules = rules("detail_ppm = 500", &format!("detail_ppm = {ppm}"));
+        let found = measured_by(&frame, &rules);
+        assert_eq!(found.segments.len(), segments, "{ppm}");
+        assert_eq!(found.class_pixels("chair"), 1, "{ppm}");
+        assert!(found.words.contains_key("chair"), "{ppm}");
+    }
 }
 
 #[test]
 fn void_counts_if_it_is_wider_than_a_margin() {
     let (width, height) = (40, 200);
-    let void = |i: usize| {
-        let (x, y) = (i % width, i / width);
-        // A void border of 4 pixels left and right, and a hole of 5 × 6 pixels in the lower half.
-        x < 4 || x >= width - 4 || (10..15).contains(&x) && (150..156).contains(&y)
-    };
-    let ids = (0..width * height).map(|i| u16::from(!void(i))).collect();
+    let ids = (0..width * height)
+        .map(|i| {
+            let (x, y) = (i % width, i / width);
+            // A void border of 4 pixels left and right, and a hole of 5 × 6 pixels in the lower half.
+            let is_hole = (10..15).contains(&x) && (150..156).contains(&y);
+            u16::from((4..width - 4).contains(&x) && !is_hole)
+        })
+        .collect();
     let found = measured(&frame(width, height, ids));
     assert_eq!(
         (found.void, found.effective_void, found.lower_void),
@@ -350,16 +353,15 @@ fn reference(frame: &Frame) -> BTreeMap<u32, (u64, u64, Option<[u32; 3]>)> {
     for ((y, x), id) in segments.indexed_iter().filter(|(_, id)| **id != 0) {
         let entry = found.entry(*id).or_insert((0, 0, Vec::new(), Vec::new()));
         entry.0 += 1;
-        let same = |y: Option<usize>, x: Option<usize>| {
-            y.zip(x).and_then(|(y, x)| segments.get((y, x))) == Some(id)
-        };
+        // Beyond the upper and left edges, the wrapped index is outside the map too.
         let around = [
-            same(y.checked_sub(1), Some(x)),
-            same(Some(y + 1), Some(x)),
-            same(Some(y), x.checked_sub(1)),
-            same(Some(y), Some(x + 1)),
+            (y.wrapping_sub(1), x),
+            (y + 1, x),
+            (y, x.wrapping_sub(1)),
+            (y, x + 1),
         ];
-        entry.1 += u64::from(around.contains(&false));
+        let is_rim = around.iter().any(|place| segments.get(*place) != Some(id));
+        entry.1 += u64::from(is_rim);
         let rows = y.saturating_sub(1)..=(y + 1).min(height - 1);
         let core = rows
             .flat_map(|j| (x.saturating_sub(1)..=(x + 1).min(width - 1)).map(move |i| (j, i)))
@@ -376,17 +378,16 @@ fn reference(frame: &Frame) -> BTreeMap<u32, (u64, u64, Option<[u32; 3]>)> {
             entry.3.push(0);
         }
     }
-    let quantiles = |mut depths: Vec<u32>| {
-        depths.sort_unstable();
-        (!depths.is_empty())
-            .then(|| [10, 50, 90].map(|percent| depths[(depths.len() * percent).div_ceil(100) - 1]))
-    };
     found
         .into_iter()
         .map(|(id, (area, rim, all, core))| {
             let eroded: Vec<u32> = core.iter().copied().filter(|depth| *depth > 0).collect();
-            let depths = if core.is_empty() { all } else { eroded };
-            (id, (area, rim, quantiles(depths)))
+            let mut depths = if core.is_empty() { all } else { eroded };
+            depths.sort_unstable();
+            let quantiles = (!depths.is_empty()).then(|| {
+                [10, 50, 90].map(|percent| depths[(depths.len() * percent).div_ceil(100) - 1])
+            });
+            (id, (area, rim, quantiles))
         })
         .collect()
 }
@@ -396,11 +397,16 @@ proptest! {
     fn measurements_of_any_maps_agree_with_the_reference(
         width in 1..24_usize, height in 1..24_usize, coarse in 1..6_usize, bits in any::<u128>(), seed in any::<u32>(),
     ) {
-        let cell = |i: usize| i % width / coarse * 5 + i / width / coarse * 11;
         let pixels = 0..width * height;
-        let id = |i: usize| (bits >> (cell(i) % 125) & 7) as u32;
-        let mut frame = frame(width, height, pixels.clone().map(|i| (id(i) % 6) as u16).collect());
-        let ids: Vec<u32> = pixels.clone().map(|i| id(i) * 1_000_003).collect();
+        let ids: Vec<u32> = pixels
+            .clone()
+            .map(|i| {
+                let cell = i % width / coarse * 5 + i / width / coarse * 11;
+                (bits >> (cell % 125) & 7) as u32
+            })
+            .collect();
+        let mut frame = frame(width, height, ids.iter().map(|id| (id % 6) as u16).collect());
+        let ids: Vec<u32> = ids.iter().map(|id| id * 1_000_003).collect();
         frame.segments = Some(map(width, height, &ids));
         let depths: Vec<u32> = pixels.map(|i| (i as u32).wrapping_mul(seed | 1) >> 18).collect();
         frame.depth = Some(map(width, height, &depths));
@@ -426,36 +432,31 @@ proptest! {
 fn the_light_of_a_frame_is_that_of_its_surfaces() {
     let (width, height) = (40, 20);
     // A window of code 255 above a wall of code 200 with a chair of code 90 in it, and void of code 250 below.
-    let class = |x: usize, y: usize| match (x, y) {
-        (_, 0..4) => 5,
-        (_, 18..) => 0,
-        (16..24, 8..12) => 4,
-        _ => 1,
-    };
-    let places = || (0..width * height).map(|i| (i % width, i / width));
-    let semantic: Vec<u16> = places().map(|(x, y)| class(x, y)).collect();
-    let code = |class: &u16| [250, 200, 0, 0, 90, 255][usize::from(*class)];
+    let semantic: Vec<u16> = (0..width * height)
+        .map(|i| match (i % width, i / width) {
+            (_, 0..4) => 5,
+            (_, 18..) => 0,
+            (16..24, 8..12) => 4,
+            _ => 1,
+        })
+        .collect();
     let mut frame = frame(width, height, semantic.clone());
-    let codes = semantic.iter().flat_map(|class| [code(class); 3]);
+    let codes = semantic
+        .iter()
+        .flat_map(|class| [[250, 200, 0, 0, 90, 255][usize::from(*class)]; 3]);
     frame.rgb = Rgb::new(height, width, codes.collect()).unwrap();
     let mut labels = labels();
-    let window = Label {
-        name: "window".into(),
-        canonical: "window".into(),
-    };
-    labels.labels.insert(5, window);
+    labels.labels.insert(5, label("window", "window"));
     let rules = Rules::built_in().unwrap();
     let palette = Palette::built_in().unwrap();
     let measured = measure(&frame, &labels, &rules, &palette, Digest::from_bytes(b"")).unwrap();
     assert_eq!(measured.light, [200; 3]);
-    let around = |class: &str| {
-        measured
+    // Around the chair is the wall; around the wall only the chair, because windows and void are no surfaces.
+    for (class, around) in [("chair", 200), ("wall", 90)] {
+        let segment = measured
             .segments
             .iter()
-            .find(|segment| segment.class == class)
-            .unwrap()
-            .around
-    };
-    // Around the chair is the wall; around the wall only the chair, because windows and void are no surfaces.
-    assert_eq!((around("chair"), around("wall")), (Some(200), Some(90)));
+            .find(|segment| segment.class == class);
+        assert_eq!(segment.unwrap().around, Some(around), "{class}");
+    }
 }

@@ -66,36 +66,40 @@ fn yes_needs_the_room_and_an_enabler() {
     }
 }
 
+/// Why questions about the laundry are rejected.
+fn laundry_reasons(labels: &Labels, frames: &[FrameStatistics]) -> Vec<Option<Reason>> {
+    let rules = Rules::built_in().unwrap();
+    run_rules_of(frames, |_| {}, &rules, labels)
+        .candidates
+        .iter()
+        .filter_map(|result| match result {
+            RuleResult::Viable(candidate) if candidate.about == "do the laundry" => Some(None),
+            RuleResult::Rejected(rejected) if rejected.about == "do the laundry" => {
+                Some(Some(rejected.reason))
+            }
+            _ => None,
+        })
+        .collect()
+}
+
 #[test]
 fn an_activity_that_the_data_set_cannot_enable_is_not_asked_about() {
-    let reasons = |labels: &Labels, frames: &[FrameStatistics]| {
-        let rules = Rules::built_in().unwrap();
-        let results = run_rules_of(frames, |_| {}, &rules, labels);
-        results
-            .candidates
-            .iter()
-            .filter_map(|result| match result {
-                RuleResult::Viable(candidate) if candidate.about == "do the laundry" => Some(None),
-                RuleResult::Rejected(rejected) if rejected.about == "do the laundry" => {
-                    Some(Some(rejected.reason))
-                }
-                _ => None,
-            })
-            .collect::<Vec<_>>()
-    };
     let bedroom = [frame(&BEDROOM)];
     let knows = labels();
-    assert_eq!(reasons(&knows, &bedroom), [Some(Reason::OtherRoom), None]);
+    assert_eq!(
+        laundry_reasons(&knows, &bedroom),
+        [Some(Reason::OtherRoom), None]
+    );
     let mut knows_none = knows.clone();
     let named = &mut knows_none.labels;
     named.retain(|_, label| label.name != "washing machine");
     let (other, cannot) = (Some(Reason::OtherRoom), Some(Reason::Inexpressible));
-    assert_eq!(reasons(&knows_none, &bedroom), [other, cannot]);
+    assert_eq!(laundry_reasons(&knows_none, &bedroom), [other, cannot]);
     // A word of one frame is a word of the data set.
     let mut laundry = frame(&[("appliances", "clothes dryer", 9_000)]);
     laundry.frame = FrameId("scene/1".into());
     let both = [bedroom[0].clone(), laundry];
-    assert_eq!(reasons(&knows_none, &both), [other, None]);
+    assert_eq!(laundry_reasons(&knows_none, &both), [other, None]);
 }
 
 #[test]
@@ -116,7 +120,6 @@ fn the_sofa_of_a_coarse_label_may_be_an_armchair() {
 #[test]
 fn no_needs_that_no_enabler_and_no_substitute_is_visible() {
     let bathroom = [("toilet", "toilet", 60_000), ("towel", "towel", 9_000)];
-    let with = |class, word| frame(&[&bathroom[..], &[(class, word, 1)]].concat());
     assert_eq!(ask(&frame(&bathroom), "sleep", "no"), None);
     assert_eq!(
         ask(&frame(&bathroom), "use the toilet", "no"),
@@ -134,8 +137,9 @@ fn no_needs_that_no_enabler_and_no_substitute_is_visible() {
         ("have dinner with my family", "table", "table"),
         ("work at a desk", "table", "side table"),
     ] {
+        let seen = frame(&[&bathroom[..], &[(class, word, 1)]].concat());
         assert_eq!(
-            ask(&with(class, word), activity, "no"),
+            ask(&seen, activity, "no"),
             Some(Reason::Seen),
             "{activity} {word}"
         );
@@ -146,21 +150,20 @@ fn no_needs_that_no_enabler_and_no_substitute_is_visible() {
 #[test]
 fn no_needs_a_frame_that_can_show_absence() {
     let bedroom = frame(&BEDROOM);
-    let no = |frame: &FrameStatistics| ask(frame, "cook a meal", "no");
-    assert_eq!(no(&bedroom), None);
-    let void = |effective_void| FrameStatistics {
-        effective_void,
-        ..bedroom.clone()
-    };
-    assert_eq!(
-        (no(&void(50_000)), no(&void(50_001))),
-        (None, Some(Reason::Void))
-    );
-    let mirror = |area| frame(&[&BEDROOM[..], &[("mirror", "mirror", area)]].concat());
-    assert_eq!(
-        (no(&mirror(30_000)), no(&mirror(30_001))),
-        (None, Some(Reason::Mirror))
-    );
+    assert_eq!(ask(&bedroom, "cook a meal", "no"), None);
+    let void = [50_000, 50_001].map(|effective_void| {
+        let frame = FrameStatistics {
+            effective_void,
+            ..bedroom.clone()
+        };
+        ask(&frame, "cook a meal", "no")
+    });
+    assert_eq!(void, [None, Some(Reason::Void)]);
+    let mirror = [30_000, 30_001].map(|area| {
+        let frame = frame(&[&BEDROOM[..], &[("mirror", "mirror", area)]].concat());
+        ask(&frame, "cook a meal", "no")
+    });
+    assert_eq!(mirror, [None, Some(Reason::Mirror)]);
 }
 
 #[test]

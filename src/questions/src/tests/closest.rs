@@ -44,16 +44,16 @@ fn the_nearest_object_is_the_answer() {
 
 #[test]
 fn the_gap_must_be_wide() {
-    let gap = |depth| two(|frame| frame.segments[1].depth = Some(depth_at(50_000, depth)));
-    assert_eq!((gap(2300), gap(2299)), (None, Some(Reason::Gap)));
-    let far = |depth| {
-        two(|frame| {
-            frame.segments[0].depth = Some(depth_at(50_000, 5000));
-            frame.segments[1].depth = Some(depth_at(50_000, depth));
-        })
-    };
-    assert_eq!((far(5500), far(5499)), (None, Some(Reason::Gap)));
-    let near = |p10| {
+    for (nearest, depths) in [(2000, [2300, 2299]), (5000, [5500, 5499])] {
+        let reasons = depths.map(|depth| {
+            two(|frame| {
+                frame.segments[0].depth = Some(depth_at(50_000, nearest));
+                frame.segments[1].depth = Some(depth_at(50_000, depth));
+            })
+        });
+        assert_eq!(reasons, [None, Some(Reason::Gap)], "{nearest}");
+    }
+    let reasons = [2050, 2049, 1899].map(|p10| {
         two(|frame| {
             frame.segments[1].depth = Some(SegmentDepth {
                 valid: 50_000,
@@ -62,15 +62,16 @@ fn the_gap_must_be_wide() {
                 p90: 3100,
             });
         })
-    };
-    assert_eq!((near(2050), near(2049)), (None, Some(Reason::Gap)));
-    assert_eq!(near(1899), Some(Reason::Disputed));
+    });
+    assert_eq!(reasons, [None, Some(Reason::Gap), Some(Reason::Disputed)]);
 }
 
 #[test]
 fn the_scope_decides_about_two_objects_of_one_class() {
-    let same = |frame: &mut FrameStatistics| third(frame, "chair", 50_000, Some(2100));
-    assert_eq!(two(same), Some(Reason::Gap));
+    assert_eq!(
+        two(|frame| third(frame, "chair", 50_000, Some(2100))),
+        Some(Reason::Gap)
+    );
     let classes = rules("gap_scope = \"instances\"", "gap_scope = \"classes\"");
     let mut frame = frame(&[("chair", "chair", 50_000), ("table", "table", 50_000)]);
     third(&mut frame, "chair", 50_000, Some(3100));
@@ -111,35 +112,38 @@ fn two_objects_must_be_eligible() {
         two(|frame| frame.segments[1].class = "chair".into()),
         Some(Reason::Few)
     );
-    let small = |area| {
+    let small = [5_000, 4_999].map(|area| {
         two(|frame| {
             let segment = &mut frame.segments[1];
             (segment.area, segment.pure, segment.core) = (area, area, area);
             segment.depth = Some(depth_at(area, 3000));
         })
-    };
-    assert_eq!((small(5_000), small(4_999)), (None, Some(Reason::Few)));
-    let valid = |valid| two(|frame| frame.segments[1].depth = Some(depth_at(valid, 3000)));
-    assert_eq!((valid(25_000), valid(24_999)), (None, Some(Reason::Few)));
+    });
+    assert_eq!(small, [None, Some(Reason::Few)]);
+    let unmeasured = [25_000, 24_999]
+        .map(|valid| two(|frame| frame.segments[1].depth = Some(depth_at(valid, 3000))));
+    assert_eq!(unmeasured, [None, Some(Reason::Few)]);
 }
 
 #[test]
 fn depth_must_exist_and_be_plausible() {
     assert_eq!(two(|frame| frame.depth = None), Some(Reason::NoDepth));
-    let median = |median| two(|frame| frame.depth.as_mut().unwrap().median = median);
-    assert_eq!((median(300), median(299)), (None, Some(Reason::Scale)));
-    assert_eq!(
-        (median(15_000), median(15_001)),
-        (None, Some(Reason::Scale))
-    );
-    let void = |lower_void| two(|frame| frame.lower_void = lower_void);
-    assert_eq!((void(50_000), void(50_001)), (None, Some(Reason::Void)));
+    for medians in [[300, 299], [15_000, 15_001]] {
+        let reasons =
+            medians.map(|median| two(|frame| frame.depth.as_mut().unwrap().median = median));
+        assert_eq!(reasons, [None, Some(Reason::Scale)], "{medians:?}");
+    }
+    let void = [50_000, 50_001].map(|void| two(|frame| frame.lower_void = void));
+    assert_eq!(void, [None, Some(Reason::Void)]);
+}
+
+/// Why the question is rejected if a third segment is in the frame.
+fn rival(class: &str, area: u64, depth: Option<u32>) -> Option<Reason> {
+    two(|frame| third(frame, class, area, depth))
 }
 
 #[test]
 fn objects_that_may_be_nearer_block_the_question() {
-    let rival =
-        |class: &'static str, area, depth| two(move |frame| third(frame, class, area, depth));
     for class in ["objects", "misc", "furniture", "clothes", "gym_equipment"] {
         assert_eq!(
             rival(class, 2_000, Some(2_999)),
@@ -166,7 +170,7 @@ fn objects_that_may_be_nearer_block_the_question() {
         frame.segments.last_mut().unwrap().pure = 70_000;
     });
     assert_eq!(mixed, Some(Reason::Rival));
-    let reaching = |p10| {
+    let reaching = [1_900, 1_899].map(|p10| {
         two(|frame| {
             third(frame, "objects", 90_000, Some(4_000));
             frame.segments.last_mut().unwrap().depth = Some(SegmentDepth {
@@ -176,19 +180,16 @@ fn objects_that_may_be_nearer_block_the_question() {
                 p90: 5_000,
             });
         })
-    };
-    assert_eq!(
-        (reaching(1_900), reaching(1_899)),
-        (None, Some(Reason::Rival))
-    );
-    let loose = |class: &'static str, pixels| {
-        two(move |frame| {
+    });
+    assert_eq!(reaching, [None, Some(Reason::Rival)]);
+    for (class, pixels, expected) in [
+        ("objects", 1_999, None),
+        ("objects", 2_000, Some(Reason::Rival)),
+        ("wall", 500_000, None),
+    ] {
+        let reason = two(|frame| {
             frame.loose.insert(class.into(), pixels);
-        })
-    };
-    assert_eq!(
-        (loose("objects", 1_999), loose("objects", 2_000)),
-        (None, Some(Reason::Rival))
-    );
-    assert_eq!(loose("wall", 500_000), None);
+        });
+        assert_eq!(reason, expected, "{class} {pixels}");
+    }
 }

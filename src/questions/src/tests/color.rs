@@ -67,33 +67,30 @@ fn things_are_called_by_their_own_words() {
 
 #[test]
 fn the_object_must_be_unique_and_large_enough() {
-    let with_second = |area| {
+    let with_second = [999, 1_000].map(|area| {
         let frame = frame(&[("sofa", "sofa", 100_000), ("sofa", "sofa", area)]);
         candidate(&frame, &Family::Color, "sofa", "").err()
-    };
-    assert_eq!(
-        (with_second(999), with_second(1_000)),
-        (None, Some(Reason::NotUnique))
-    );
-    let loose = |pixels| {
+    });
+    assert_eq!(with_second, [None, Some(Reason::NotUnique)]);
+    let loose = [999, 1_000].map(|pixels| {
         sofa(|frame| {
             frame.loose.insert("sofa".into(), pixels);
         })
-    };
-    assert_eq!((loose(999), loose(1_000)), (None, Some(Reason::NotUnique)));
-    let area = |area| {
+    });
+    assert_eq!(loose, [None, Some(Reason::NotUnique)]);
+    let small = [10_000, 9_999].map(|area| {
         let frame = frame(&[("sofa", "sofa", area)]);
         candidate(&frame, &Family::Color, "sofa", "").err()
-    };
-    assert_eq!((area(10_000), area(9_999)), (None, Some(Reason::Small)));
-    let core = |core| {
+    });
+    assert_eq!(small, [None, Some(Reason::Small)]);
+    let small_core = [2_000, 1_999].map(|core| {
         sofa(|frame| {
             frame.segments[1].core = core;
             frame.segments[1].colors = [0; NONE + 1];
             frame.segments[1].colors[Color::Brown as usize] = core;
         })
-    };
-    assert_eq!((core(2_000), core(1_999)), (None, Some(Reason::Small)));
+    });
+    assert_eq!(small_core, [None, Some(Reason::Small)]);
     for class in [
         "mirror",
         "window",
@@ -120,16 +117,11 @@ fn the_object_must_be_unique_and_large_enough() {
 
 #[test]
 fn over_exposed_and_crushed_pixels_block_the_question() {
-    let bright = |bright| sofa(|frame| frame.segments[1].bright = bright);
-    assert_eq!(
-        (bright(40_000), bright(40_001)),
-        (None, Some(Reason::Bright))
-    );
-    let crushed = |crushed| sofa(|frame| frame.segments[1].crushed = crushed);
-    assert_eq!(
-        (crushed(40_000), crushed(40_001)),
-        (None, Some(Reason::Crushed))
-    );
+    let pixels = [40_000, 40_001];
+    let bright = pixels.map(|bright| sofa(|frame| frame.segments[1].bright = bright));
+    assert_eq!(bright, [None, Some(Reason::Bright)]);
+    let crushed = pixels.map(|crushed| sofa(|frame| frame.segments[1].crushed = crushed));
+    assert_eq!(crushed, [None, Some(Reason::Crushed)]);
     for (color, median) in [(Color::White, [250; 3]), (Color::Black, [2; 3])] {
         let reason = sofa(|frame| {
             let sofa = &mut frame.segments[1];
@@ -158,13 +150,17 @@ fn lit(color: Color, code: [u8; 3], light: [u8; 3], around: Option<u8>) -> Optio
 
 #[test]
 fn a_colour_must_be_the_same_relative_to_the_light() {
-    let grey = |light, around| lit(Color::Grey, [128; 3], light, around);
-    // In full light it is grey. If nothing in the frame, or nothing near, is brighter, it may be white in shade.
-    assert_eq!(grey([250; 3], Some(245)), None);
-    assert_eq!(grey([135; 3], Some(245)), Some(Reason::Lit));
-    assert_eq!(grey([250; 3], Some(135)), Some(Reason::Lit));
-    // Without surfaces around it, only the light of the frame counts.
-    assert_eq!(grey([250; 3], None), None);
+    for (light, around, expected) in [
+        (250, Some(245), None),
+        // If nothing in the frame, or nothing near, is brighter, it may be white in shade.
+        (135, Some(245), Some(Reason::Lit)),
+        (250, Some(135), Some(Reason::Lit)),
+        // Without surfaces around it, only the light of the frame counts.
+        (250, None, None),
+    ] {
+        let reason = lit(Color::Grey, [128; 3], [light; 3], around);
+        assert_eq!(reason, expected, "{light} {around:?}");
+    }
     // Under warm light, a grey thing that looks brown is not asked about; nor is a brown one that looks orange in sunshine.
     let brown = [150, 108, 66];
     assert_eq!(lit(Color::Brown, brown, [250; 3], Some(240)), None);
@@ -180,20 +176,41 @@ fn a_colour_must_be_the_same_relative_to_the_light() {
     assert_eq!(lit(Color::White, [240; 3], [250; 3], Some(90)), None);
 }
 
+/// A frame with a sofa whose core has this colour and number of pixels.
+fn view(
+    scene: &str,
+    index: u32,
+    median: [u8; 3],
+    core: u64,
+    source: WordSource,
+) -> FrameStatistics {
+    let mut view = frame(&[("wall", "wall", 500_000), ("sofa", "sofa", 100_000)]);
+    (view.frame, view.scene) = (FrameId(format!("{scene}/{index}")), scene.into());
+    let sofa = &mut view.segments[1];
+    (sofa.source, sofa.median, sofa.core) = (source, median, core);
+    view
+}
+
 #[test]
 fn two_views_of_a_thing_must_show_the_same_colour() {
-    let view = |name: &str, scene: &str, median, core, source| {
-        let mut view = frame(&[("wall", "wall", 500_000), ("sofa", "sofa", 100_000)]);
-        (view.frame, view.scene) = (FrameId(name.into()), scene.into());
-        let sofa = &mut view.segments[1];
-        (sofa.source, sofa.median, sofa.core) = (source, median, core);
-        view
-    };
     let (brown, white) = ([110, 70, 40], [250; 3]);
-    let reason = |other: FrameStatistics| {
-        let first = view("a/0", "a", brown, 100_000, WordSource::Name);
-        let results = run_rules(&[first, other], |_| {}, &Rules::built_in().unwrap());
-        results
+    let named = WordSource::Name;
+    let disagreed = Some(Reason::Disagreed);
+    for (scene, color, core, source, expected) in [
+        ("a", brown, 100_000, named, None),
+        ("a", white, 100_000, named, disagreed),
+        // Too few pixels, another scene, and numbers without names are no evidence.
+        ("a", white, 499, named, None),
+        ("a", white, 500, named, disagreed),
+        ("b", white, 100_000, named, None),
+        ("a", white, 100_000, WordSource::Label, None),
+    ] {
+        let frames = [
+            view("a", 0, brown, 100_000, named),
+            view(scene, 1, color, core, source),
+        ];
+        let results = run_rules(&frames, |_| {}, &Rules::built_in().unwrap());
+        let reason = results
             .candidates
             .into_iter()
             .find_map(|result| match result {
@@ -202,21 +219,13 @@ fn two_views_of_a_thing_must_show_the_same_colour() {
                     Some(Some(found.reason))
                 }
                 _ => None,
-            })
-            .unwrap()
-    };
-    let named = WordSource::Name;
-    assert_eq!(reason(view("a/1", "a", brown, 100_000, named)), None);
-    let disagreed = Some(Reason::Disagreed);
-    assert_eq!(reason(view("a/1", "a", white, 100_000, named)), disagreed);
-    // Too few pixels, another scene, and numbers without names are no evidence.
-    assert_eq!(reason(view("a/1", "a", white, 499, named)), None);
-    assert_eq!(reason(view("a/1", "a", white, 500, named)), disagreed);
-    assert_eq!(reason(view("b/1", "b", white, 100_000, named)), None);
-    assert_eq!(
-        reason(view("a/1", "a", white, 100_000, WordSource::Label)),
-        None
-    );
+            });
+        assert_eq!(
+            reason,
+            Some(expected),
+            "{scene} {color:?} {core} {source:?}"
+        );
+    }
 }
 
 #[test]

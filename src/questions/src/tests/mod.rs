@@ -110,11 +110,13 @@ fn default_word(class: &str) -> &str {
 /// A label space in which every class is expressible, with a label for its first word.
 pub(crate) fn labels() -> Labels {
     let rules = Rules::built_in().unwrap();
-    let classes = (1..).zip(rules.book().class.keys());
-    let label = |class: &String| Label {
-        name: default_word(class).to_owned(),
-        canonical: class.clone(),
-    };
+    let classes = (1..).zip(rules.book().class.keys()).map(|(id, class)| {
+        let label = Label {
+            name: default_word(class).to_owned(),
+            canonical: class.clone(),
+        };
+        (id, label)
+    });
     let words = [
         "washing machine",
         "desk",
@@ -130,10 +132,7 @@ pub(crate) fn labels() -> Labels {
         (id, label)
     });
     Labels {
-        labels: classes
-            .map(|(id, class)| (id, label(class)))
-            .chain(named)
-            .collect(),
+        labels: classes.chain(named).collect(),
         expressible: rules.book().class.keys().cloned().collect(),
         ..Labels::default()
     }

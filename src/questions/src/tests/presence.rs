@@ -17,7 +17,6 @@ fn yes_needs_one_good_segment() {
     let question = candidate(&chair(|_| {}), &Family::Presence, "chair", "yes").unwrap();
     assert_eq!(question.text, "Is there a chair in the image?");
     assert_eq!(question.evidence["segments"][0]["id"], 2);
-    let check = |change: fn(&mut Segment)| ask(&chair(change), "chair", "yes");
     for (change, expected) in [
         (
             (|c: &mut Segment| (c.area, c.pure) = (5_000, 5_000)) as fn(&mut Segment),
@@ -43,11 +42,11 @@ fn yes_needs_one_good_segment() {
             Some(Reason::Elsewhere),
         ),
     ] {
-        assert_eq!(check(change), expected);
+        assert_eq!(ask(&chair(change), "chair", "yes"), expected);
     }
     let pet = frame(&[("bed", "dog bed", 90_000)]);
     assert_eq!(ask(&pet, "bed", "yes"), Some(Reason::Unlike));
-    // A tiny chair beside a good one does not matter.
+    // A tiny chair in addition to a good one does not matter.
     let two = frame(&[("chair", "chair", 600), ("chair", "chair", 20_000)]);
     assert_eq!(ask(&two, "chair", "yes"), None);
 }
@@ -113,39 +112,41 @@ fn nothing_is_denied_that_a_coarse_class_may_hide() {
     for (class, rule) in &rules.book().class {
         for other in &rule.hidden {
             let mut seen = frame(&[("wall", "wall", 500_000)]);
-            let no = |seen: &FrameStatistics| ask(seen, class, "no");
-            assert_eq!(no(&seen), None, "{class}");
+            assert_eq!(ask(&seen, class, "no"), None, "{class}");
             seen.unnamed.insert(other.clone(), 1);
-            assert_eq!(no(&seen), Some(Reason::Hidden), "{class} in {other}");
+            let hidden = Some(Reason::Hidden);
+            assert_eq!(ask(&seen, class, "no"), hidden, "{class} in {other}");
         }
     }
     // Named, the same things hide nothing; but a name may be another word for the class.
-    let named = |word| frame(&[("wall", "wall", 500_000), ("objects", word, 9_000)]);
-    assert_eq!(ask(&named("vase"), "lighting", "no"), None);
-    assert_eq!(ask(&named("lamp base"), "lighting", "no"), None);
-    let resembling = Some(Reason::Confusable);
-    assert_eq!(ask(&named("salt lamp"), "lighting", "no"), resembling);
-    // "Headlamp" is one word.
-    assert_eq!(ask(&named("headlamp"), "lighting", "no"), None);
+    for (word, expected) in [
+        ("vase", None),
+        ("lamp base", None),
+        ("salt lamp", Some(Reason::Confusable)),
+        // One word.
+        ("headlamp", None),
+    ] {
+        let frame = frame(&[("wall", "wall", 500_000), ("objects", word, 9_000)]);
+        assert_eq!(ask(&frame, "lighting", "no"), expected, "{word}");
+    }
+}
+
+/// Questions about lighting whose answer is no.
+fn denied(frames: &[FrameStatistics]) -> BTreeSet<String> {
+    run_rules(frames, |_| {}, &Rules::built_in().unwrap())
+        .candidates
+        .into_iter()
+        .filter_map(|result| match result {
+            RuleResult::Viable(found) if found.about == "lighting" && found.answer() == "no" => {
+                Some(found.text)
+            }
+            _ => None,
+        })
+        .collect()
 }
 
 #[test]
 fn only_words_of_the_data_set_are_denied() {
-    let denied = |frames: &[FrameStatistics]| -> BTreeSet<String> {
-        let results = run_rules(frames, |_| {}, &Rules::built_in().unwrap());
-        results
-            .candidates
-            .into_iter()
-            .filter_map(|result| match result {
-                RuleResult::Viable(found)
-                    if found.about == "lighting" && found.answer() == "no" =>
-                {
-                    Some(found.text)
-                }
-                _ => None,
-            })
-            .collect()
-    };
     let wall = frame(&[("wall", "wall", 500_000)]);
     let lamp = "Is there a lamp in the image?".to_owned();
     assert_eq!(denied(std::slice::from_ref(&wall)), [lamp.clone()].into());
@@ -165,13 +166,8 @@ fn only_words_of_the_data_set_are_denied() {
 fn no_needs_that_no_confusable_class_is_visible() {
     let wall = frame(&[("wall", "wall", 500_000)]);
     assert_eq!(ask(&wall, "bathtub", "no"), None);
-    let with = |class: &'static str, word: &'static str| {
-        frame(&[("wall", "wall", 500_000), (class, word, 1)])
-    };
-    assert_eq!(
-        ask(&with("bathtub", "bathtub"), "bathtub", "yes"),
-        Some(Reason::Small)
-    );
+    let bathtub = frame(&[("wall", "wall", 500_000), ("bathtub", "bathtub", 1)]);
+    assert_eq!(ask(&bathtub, "bathtub", "yes"), Some(Reason::Small));
     let rules = Rules::built_in().unwrap();
     for group in &rules.book().confusable {
         for class in group
@@ -202,20 +198,17 @@ fn no_needs_that_no_confusable_class_is_visible() {
 #[test]
 fn no_needs_a_frame_that_can_show_absence() {
     let wall = frame(&[("wall", "wall", 500_000)]);
-    let no = |frame: &FrameStatistics| ask(frame, "bathtub", "no");
-    let void = |effective_void| FrameStatistics {
-        effective_void,
-        ..wall.clone()
-    };
-    assert_eq!(
-        (no(&void(50_000)), no(&void(50_001))),
-        (None, Some(Reason::Void))
-    );
-    let mirror = |area| frame(&[("mirror", "mirror", area)]);
-    assert_eq!(
-        (no(&mirror(30_000)), no(&mirror(30_001))),
-        (None, Some(Reason::Mirror))
-    );
+    let void = [50_000, 50_001].map(|effective_void| {
+        let frame = FrameStatistics {
+            effective_void,
+            ..wall.clone()
+        };
+        ask(&frame, "bathtub", "no")
+    });
+    assert_eq!(void, [None, Some(Reason::Void)]);
+    let mirror =
+        [30_000, 30_001].map(|area| ask(&frame(&[("mirror", "mirror", area)]), "bathtub", "no"));
+    assert_eq!(mirror, [None, Some(Reason::Mirror)]);
 }
 
 #[test]
@@ -239,8 +232,12 @@ fn no_is_asked_about_classes_common_in_such_rooms_elsewhere() {
     (other.frame, other.scene) = (FrameId("other/0".into()), "other".into());
     let rules = Rules::built_in().unwrap();
     let results = run_rules(&[frame(&BEDROOM), other], |_| {}, &rules);
-    let reason = |class: &str| {
-        results.candidates.iter().find_map(|result| match result {
+    for (class, expected) in [
+        ("plant", None),
+        ("towel", None),
+        ("bathtub", Some(Reason::Implausible)),
+    ] {
+        let reason = results.candidates.iter().find_map(|result| match result {
             RuleResult::Rejected(rejection)
                 if rejection.family == Family::Presence && rejection.about == class =>
             {
@@ -252,9 +249,7 @@ fn no_is_asked_about_classes_common_in_such_rooms_elsewhere() {
                 Some(None)
             }
             _ => None,
-        })
-    };
-    assert_eq!(reason("plant"), Some(None));
-    assert_eq!(reason("towel"), Some(None));
-    assert_eq!(reason("bathtub"), Some(Some(Reason::Implausible)));
+        });
+        assert_eq!(reason, Some(expected), "{class}");
+    }
 }

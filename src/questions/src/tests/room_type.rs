@@ -2,19 +2,18 @@
 
 use super::*;
 
+fn ask(frame: &FrameStatistics) -> Result<String, Reason> {
+    candidate(frame, &Family::RoomType, "", "").map(|question| question.answer().to_owned())
+}
+
 #[test]
 fn it_is_asked_if_enough_is_visible() {
-    let ask = |frame: &FrameStatistics| {
-        candidate(frame, &Family::RoomType, "", "").map(|question| question.answer().to_owned())
-    };
-    let bedroom = frame(&BEDROOM);
+    let mut bedroom = frame(&BEDROOM);
     assert_eq!(ask(&bedroom), Ok("bedroom".into()));
-    let unlabelled = |void| FrameStatistics {
-        void,
-        ..bedroom.clone()
-    };
-    assert_eq!(ask(&unlabelled(400_000)), Ok("bedroom".into()));
-    assert_eq!(ask(&unlabelled(400_001)), Err(Reason::Unlabelled));
+    bedroom.void = 400_000;
+    assert_eq!(ask(&bedroom), Ok("bedroom".into()));
+    bedroom.void = 400_001;
+    assert_eq!(ask(&bedroom), Err(Reason::Unlabelled));
     assert_eq!(
         ask(&frame(&[("wall", "wall", 900_000)])),
         Err(Reason::NoRoom)
@@ -37,7 +36,10 @@ fn a_stated_room_is_used_on_request() {
     let mut frame = frame(&[("toilet", "toilet", 50_000)]);
     frame.room = Some("living_room".into());
     let rules = Rules::built_in().unwrap();
-    let answer = |source| {
+    for (source, expected) in [
+        (RoomSource::Signature, "bathroom"),
+        (RoomSource::Stated, "living room"),
+    ] {
         let results = run_rules(
             std::slice::from_ref(&frame),
             |request| request.room_source = source,
@@ -48,8 +50,6 @@ fn a_stated_room_is_used_on_request() {
             .asked
             .iter()
             .find(|asked| asked.question.family == Family::RoomType);
-        asked.map(|asked| asked.answer().to_owned())
-    };
-    assert_eq!(answer(RoomSource::Signature), Some("bathroom".into()));
-    assert_eq!(answer(RoomSource::Stated), Some("living room".into()));
+        assert_eq!(asked.unwrap().answer(), expected);
+    }
 }

@@ -201,17 +201,19 @@ fn an_office_beats_a_living_room_without_a_sofa() {
 
 #[test]
 fn a_room_behind_a_door_does_not_count() {
-    let at = |area: u64, depth: u32, measured: bool| {
+    for (area, depth, expected) in [
+        (100_000, Some(3000), Ok("kitchen".into())),
+        (100_001, Some(3000), Err(NoRoom::Contested)),
+        (100_000, Some(2999), Err(NoRoom::Contested)),
+        (100_000, None, Err(NoRoom::Contested)),
+    ] {
         let mut frame = frame(&[
             ("cabinet", "kitchen cabinet", 400_000),
             ("toilet", "toilet", area),
         ]);
         frame.segments[0].depth = Some(depth_at(400_000, 2000));
-        frame.segments[1].depth = measured.then(|| depth_at(area, depth));
-        classify(&frame, Rules::built_in().unwrap().book()).room
-    };
-    assert_eq!(at(100_000, 3000, true), Ok("kitchen".into()));
-    assert_eq!(at(100_001, 3000, true), Err(NoRoom::Contested));
-    assert_eq!(at(100_000, 2999, true), Err(NoRoom::Contested));
-    assert_eq!(at(100_000, 3000, false), Err(NoRoom::Contested));
+        frame.segments[1].depth = depth.map(|depth| depth_at(area, depth));
+        let room = classify(&frame, Rules::built_in().unwrap().book()).room;
+        assert_eq!(room, expected, "{area} {depth:?}");
+    }
 }

@@ -29,6 +29,11 @@ fn many() -> Vec<FrameStatistics> {
     frames
 }
 
+/// Questions about frames, with all answers balanced.
+fn balanced(frames: &[FrameStatistics], rules: &Rules) -> Generated {
+    run_rules(frames, |request| request.balance = BalanceMode::Full, rules).generated
+}
+
 #[test]
 fn the_order_of_frames_does_not_matter_and_ids_depend_on_content() {
     let rules = Rules::built_in().unwrap();
@@ -36,34 +41,19 @@ fn the_order_of_frames_does_not_matter_and_ids_depend_on_content() {
     let mut shuffled = frames.clone();
     shuffled.reverse();
     shuffled.swap(3, 40);
-    let questions = |frames: &[FrameStatistics]| {
-        run_rules(
-            frames,
-            |request| request.balance = BalanceMode::Full,
-            &rules,
-        )
-        .generated
-    };
-    let (one, other) = (questions(&frames), questions(&shuffled));
+    let [one, other] = [&frames, &shuffled].map(|frames| balanced(frames, &rules));
     assert_eq!(one.asked, other.asked);
     assert_eq!(one.counts, other.counts);
     let names: BTreeSet<&QuestionId> = one.asked.iter().map(|asked| &asked.question.id).collect();
     assert_eq!(names.len(), one.asked.len());
     let wider = crate::tests::rules("gap_mm = 300", "gap_mm = 301");
-    let same = run_rules(
-        &frames,
-        |request| request.balance = BalanceMode::Full,
-        &wider,
-    )
-    .generated;
-    let ids = |generated: &Generated| {
-        generated
-            .asked
+    let same = balanced(&frames, &wider);
+    assert!(
+        one.asked
             .iter()
-            .map(|asked| asked.question.id.clone())
-            .collect::<Vec<_>>()
-    };
-    assert_eq!(ids(&one), ids(&same));
+            .map(|asked| &asked.question.id)
+            .eq(same.asked.iter().map(|asked| &asked.question.id))
+    );
 }
 
 #[test]
@@ -109,15 +99,15 @@ fn questions_that_a_person_rejects_are_not_asked_and_nothing_else_changes() {
 
 #[test]
 fn no_question_is_asked_about_black_frames() {
-    let dark = |median| {
+    for (median, is_dark) in [(15, true), (16, false)] {
         let frame = FrameStatistics {
             luma: [0, median, 90],
             ..frame(&BEDROOM)
         };
         let generated = run_rules(&[frame], |_| {}, &Rules::built_in().unwrap()).generated;
-        (generated.asked.is_empty(), generated.dark.len())
-    };
-    assert_eq!((dark(15), dark(16)), ((true, 1), (false, 0)));
+        assert_eq!(generated.asked.is_empty(), is_dark, "{median}");
+        assert_eq!(generated.dark.len(), usize::from(is_dark), "{median}");
+    }
 }
 
 #[test]

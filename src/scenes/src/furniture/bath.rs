@@ -2,7 +2,7 @@
 
 use glam::{Vec3, vec3};
 
-use super::super::mesh::{Mesh, cos_sin};
+use super::super::mesh::{Mesh, cos_sin, sign};
 use super::super::paint::Paint;
 use super::super::scene::{Piece, Pose, kind};
 use super::super::seeded_rng::SeededRng;
@@ -38,39 +38,29 @@ pub(in super::super) fn bathtub(rng: &mut SeededRng) -> Piece {
     let steel = Surface::steel();
     let (length, height, depth) = (rng.between(1.55, 1.75), 0.56, 0.74);
     let mut mesh = Mesh::default();
-    let outer = |y: f32, grow: f32| {
-        ring(
-            vec3(0.0, y, depth / 2.0),
-            length / 2.0 + grow,
-            depth / 2.0 + grow,
-        )
-    };
-    let inner = |y: f32, inset: f32| {
-        ring(
-            vec3(0.0, y, depth / 2.0),
-            length / 2.0 - inset,
-            depth / 2.0 - inset,
-        )
-    };
-    mesh.grid(&[outer(0.0, -0.03), outer(height - 0.04, -0.005)], &white);
-    mesh.grid(
-        &[
-            outer(height - 0.04, 0.0),
-            outer(height - 0.01, 0.012),
-            outer(height, 0.0),
-            inner(height, 0.06),
-        ],
-        &white,
-    );
-    mesh.grid(
-        &[
-            inner(height, 0.06),
-            inner(height * 0.5, 0.1),
-            inner(0.16, 0.18),
-            inner(0.13, 0.3),
-        ],
-        &white,
-    );
+    let outside = [(0.0, -0.03), (height - 0.04, -0.005)];
+    let rim = [
+        (height - 0.04, 0.0),
+        (height - 0.01, 0.012),
+        (height, 0.0),
+        (height, -0.06),
+    ];
+    let inside = [
+        (height, -0.06),
+        (height * 0.5, -0.1),
+        (0.16, -0.18),
+        (0.13, -0.3),
+    ];
+    for profile in [&outside[..], &rim, &inside] {
+        let rings: Vec<Vec<Vec3>> = profile
+            .iter()
+            .map(|(y, grow)| {
+                let middle = vec3(0.0, *y, depth / 2.0);
+                ring(middle, length / 2.0 + grow, depth / 2.0 + grow)
+            })
+            .collect();
+        mesh.grid(&rings, &white);
+    }
     mesh.quad(
         [
             vec3(-length / 2.0 + 0.2, 0.135, 0.2),
@@ -97,7 +87,6 @@ fn ring(middle: Vec3, half_width: f32, half_depth: f32) -> Vec<Vec3> {
     let mut points: Vec<Vec3> = (0..24)
         .map(|i| {
             let around = cos_sin(std::f32::consts::TAU * (i as f32 + 0.5) / 24.0);
-            let sign = |v: f32| if v < 0.0 { -1.0 } else { 1.0 };
             middle
                 + vec3(
                     sign(around.x) * (half_width - radius) + around.x * radius,

@@ -128,12 +128,6 @@ impl Solid {
     /// Adds the solid to a mesh; `None` if its shape is unknown or its numbers do not fit the shape.
     fn add_to(&self, mesh: &mut Mesh, surface: &Surface) -> Option<()> {
         let point = Vec3::from_slice;
-        let pairs = |numbers: &[f32]| -> Vec<(f32, f32)> {
-            numbers
-                .chunks_exact(2)
-                .map(|pair| (pair[0], pair[1]))
-                .collect()
-        };
         match (self.shape, &self.numbers[..]) {
             ("box", &[x, to_x, y, to_y, z, to_z]) => {
                 mesh.block(vec3(x, y, z), vec3(to_x, to_y, to_z), surface);
@@ -177,6 +171,13 @@ impl Solid {
             }
         }
     }
+}
+
+fn pairs(numbers: &[f32]) -> Vec<(f32, f32)> {
+    numbers
+        .chunks_exact(2)
+        .map(|pair| (pair[0], pair[1]))
+        .collect()
 }
 
 /// Returns the paint for a colour of the table: a name or a hexadecimal code.

@@ -69,18 +69,16 @@ fn add_leaf(
 ) {
     let out = cos_sin(angle);
     let (forward, aside) = (vec3(out.x, 0.0, out.y), vec3(-out.y, 0.0, out.x));
-    let spine = |share: f32| {
-        let bent = share * share;
-        stem + forward * (reach * share)
-            + Vec3::Y * (rise * (1.0 - (1.0 - share) * (1.0 - share)) - 0.35 * reach * bent)
-    };
     let rows: Vec<Vec<Vec3>> = (0..=7)
         .map(|i| {
             let share = i as f32 / 7.0;
             let blade = ((share - 0.3) / 0.7).clamp(0.0, 1.0);
             let half =
                 height * (0.006 + 0.075 * 4.0 * blade * (1.0 - blade) * (1.15 - blade * 0.4));
-            let middle = spine(share);
+            let bent = share * share;
+            let middle = stem
+                + forward * (reach * share)
+                + Vec3::Y * (rise * (1.0 - (1.0 - share) * (1.0 - share)) - 0.35 * reach * bent);
             let fold = Vec3::Y * (half * 0.35);
             vec![
                 middle - aside * half + fold,

@@ -16,7 +16,8 @@ pub(in super::super) fn curtains(window: f32, drop: f32, rng: &mut SeededRng) ->
     let cloth = Surface::fabric(paint, rng);
     let width = rng.between(0.42, 0.6);
     let name = kind("curtain", "curtain");
-    let half = |left: f32, rod: bool| {
+    let out = window / 2.0 - 0.08;
+    [(-out - width, true), (out, false)].map(|(left, rod)| {
         let mut mesh = Mesh::default();
         mesh.drape(vec3(left, 0.0, 0.08), width, drop, 0.13, &cloth);
         if rod {
@@ -25,9 +26,7 @@ pub(in super::super) fn curtains(window: f32, drop: f32, rng: &mut SeededRng) ->
             mesh.rod(ends[0], ends[1], 0.013, &Surface::steel());
         }
         Piece::new(name, mesh, paint.name)
-    };
-    let out = window / 2.0 - 0.08;
-    [half(-out - width, true), half(out, false)]
+    })
 }
 
 /// A towel over a rail on the wall, with the rail at y = 0.
@@ -37,19 +36,16 @@ pub(in super::super) fn towel(rng: &mut SeededRng) -> Piece {
     let (width, drop) = (rng.between(0.36, 0.5), rng.between(0.55, 0.75));
     let mut mesh = Mesh::default();
     for (z, share) in [(0.09, 1.0), (0.045, 0.8)] {
-        let wave = |x: f32| 0.006 * cos_sin(x * 14.0).y;
-        let row = |y: f32| -> Vec<Vec3> {
+        let rows: [Vec<Vec3>; 3] = [0.012, -drop * share / 2.0, -drop * share].map(|y| {
             (0..=12)
                 .map(|i| {
                     let x = (i as f32 / 12.0 - 0.5) * width;
-                    vec3(x, y, z + wave(x))
+                    let wave = 0.006 * cos_sin(x * 14.0).y;
+                    vec3(x, y, z + wave)
                 })
                 .collect()
-        };
-        mesh.grid(
-            &[row(0.012), row(-drop * share / 2.0), row(-drop * share)],
-            &cloth,
-        );
+        });
+        mesh.grid(&rows, &cloth);
     }
     let (a, b) = (width / 2.0, 0.0);
     mesh.board(a, [b, b + 0.022], [0.045, 0.095], &cloth);

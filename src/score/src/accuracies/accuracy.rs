@@ -10,7 +10,7 @@ use super::health::Health;
 use crate::choice::ReadingMode;
 use crate::estimate::{ClusterCount, Estimate};
 use crate::grid::{Grid, GridItem, TrialResult};
-use crate::subject::{CHANCE, ModelInCondition};
+use crate::model_in_condition::{CHANCE, ModelInCondition};
 use darkqa_ground::types::{Family, UnreadReason, Variant};
 
 /// Accuracy of one subject on one family in one parsing.
@@ -201,10 +201,11 @@ fn chance_cells(questions: &[OfferedChoices]) -> Vec<AccuracyCell> {
     std::iter::once(None)
         .chain(families.into_iter().map(Some))
         .flat_map(|family| {
-            let of_family = questions
-                .iter()
-                .filter(|question| family.is_none_or(|family| question.family == *family));
-            let accuracy = chance(of_family);
+            let accuracy = chance(
+                questions
+                    .iter()
+                    .filter(|question| family.is_none_or(|family| question.family == *family)),
+            );
             ReadingMode::ALL.map(|mode| AccuracyCell {
                 subject: ModelInCondition {
                     model: CHANCE.to_owned(),

@@ -82,12 +82,16 @@ mod tests {
         }
     }
 
-    #[test]
-    fn with_all_orders_long_questions_count_more() {
-        let rotated = |choices| OfferedChoices {
+    /// A question that is asked once for each rotation of its choices.
+    fn rotated(choices: usize) -> OfferedChoices {
+        OfferedChoices {
             orders: choices,
             ..question(choices)
-        };
+        }
+    }
+
+    #[test]
+    fn with_all_orders_long_questions_count_more() {
         let questions = [rotated(2), rotated(4)];
         assert_eq!(chance(&questions).unwrap(), Estimate::exact(2.0 / 6.0, 6));
         assert_eq!(

@@ -6,7 +6,7 @@ use super::accuracy::{AccuracySummary, summarize};
 use super::chance::OfferedChoices;
 use super::health::healths;
 use crate::grid::Grid;
-use crate::subject::ModelInCondition;
+use crate::model_in_condition::ModelInCondition;
 use darkqa_ground::types::{QuestionId, View};
 
 /// Number of questions that a model was asked, in any condition.

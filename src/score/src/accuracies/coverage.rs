@@ -68,15 +68,14 @@ impl Coverage {
         let Some(all) = most.0.get(&level) else {
             return [0, 0];
         };
-        let count = |answered: Option<&Vec<bool>>| {
+        [Some(all), self.0.get(&level)].map(|answered| {
             answered
                 .into_iter()
                 .flatten()
                 .zip(all)
                 .filter(|(here, there)| **here && **there)
                 .count()
-        };
-        [count(Some(all)), count(self.0.get(&level))]
+        })
     }
 
     /// Levels at which less than [`MIN_SHARE`] of the items of `most` are answered, with both numbers of items.

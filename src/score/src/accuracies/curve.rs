@@ -5,7 +5,6 @@ use rayon::prelude::*;
 use crate::bootstrap::Resamples;
 use crate::choice::ReadingMode;
 use crate::grid::{Grid, TrialResult};
-use crate::subject::ModelInCondition;
 use crate::threshold::{CurveSummary, LevelCounts};
 use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{Axis, AxisLevel, EnhancerName, Family, RunGroup, Variant, View};
@@ -65,34 +64,32 @@ impl CurvePoints {
         keys.sort_unstable();
         keys.dedup();
         keys.sort_by_cached_key(|(model, ..)| grid.listing.place(model));
-        let points = keys.into_iter().map(|(model, variant, enhancer)| {
-            let on_curve = |subject: &ModelInCondition| {
-                subject.view == Some(View::Image)
-                    && subject.model == model
-                    && (subject.level == Some(AxisLevel::L0)
-                        && subject.enhancer.is_none()
-                        && RunGroup::overlap(
-                            subject.variant.group.as_ref(),
-                            variant.group.as_ref(),
-                        )
-                        || subject.variant == *variant && subject.enhancer.as_ref() == enhancer)
-            };
-            let mut subjects: Vec<(AxisLevel, usize)> = grid
-                .subjects
-                .iter()
-                .enumerate()
-                .filter(|(_, subject)| on_curve(subject))
-                .filter_map(|(index, subject)| Some((subject.level?, index)))
-                .collect();
-            subjects.sort_unstable();
-            Self {
-                model: model.to_owned(),
-                variant: variant.clone(),
-                enhancer: enhancer.cloned(),
-                subjects,
-            }
-        });
-        points
+        keys.into_iter()
+            .map(|(model, variant, enhancer)| {
+                let group = variant.group.as_ref();
+                let mut subjects: Vec<(AxisLevel, usize)> = grid
+                    .subjects
+                    .iter()
+                    .enumerate()
+                    .filter(|(_, subject)| {
+                        subject.view == Some(View::Image)
+                            && subject.model == model
+                            && (subject.level == Some(AxisLevel::L0)
+                                && subject.enhancer.is_none()
+                                && RunGroup::overlap(subject.variant.group.as_ref(), group)
+                                || subject.variant == *variant
+                                    && subject.enhancer.as_ref() == enhancer)
+                    })
+                    .filter_map(|(index, subject)| Some((subject.level?, index)))
+                    .collect();
+                subjects.sort_unstable();
+                Self {
+                    model: model.to_owned(),
+                    variant: variant.clone(),
+                    enhancer: enhancer.cloned(),
+                    subjects,
+                }
+            })
             .filter(|points| points.subjects.len() > 1 && points.subjects[0].0 == AxisLevel::L0)
             .collect()
     }
@@ -113,16 +110,15 @@ fn curve(
     family: Option<&Family>,
     points: CurvePoints,
 ) -> Option<Curve> {
-    let subjects = points.subjects.iter();
-    let counts = |mode| LevelCounts {
-        levels: subjects.clone().map(|(level, _)| *level).collect(),
+    let subjects = &points.subjects;
+    let [strict, lenient] = ReadingMode::ALL.map(|mode| LevelCounts {
+        levels: subjects.iter().map(|(level, _)| *level).collect(),
         counts: subjects
-            .clone()
+            .iter()
             .map(|(_, subject)| grid.counts(*subject, family, mode))
             .collect(),
-        guesses: guesses(grid, points.subjects[0].1, family),
-    };
-    let (strict, lenient) = (counts(ReadingMode::Strict), counts(ReadingMode::Lenient));
+        guesses: guesses(grid, subjects[0].1, family),
+    });
     let summary = strict.summary(draws)?;
     Some(Curve {
         lenient: if lenient.counts == strict.counts {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::choice::ReadingMode;
 use crate::grid::{Grid, TrialResult};
-use crate::subject::ModelInCondition;
+use crate::model_in_condition::ModelInCondition;
 use darkqa_ground::types::{FailureKind, TrialRef, UnreadReason};
 
 /// Counts of replies, unreadable replies and failures of one subject.

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use crate::choice::ReadingMode;
 use crate::estimate::{ClusterCount, Estimate};
 use crate::grid::{Grid, TrialResult};
-use crate::subject::ModelInCondition;
+use crate::model_in_condition::ModelInCondition;
 use darkqa_ground::types::{Family, QuestionId, RunQuestion, StrictGroup};
 
 /// Share of groups in which a subject answers all questions right, in one parsing.
@@ -91,42 +91,32 @@ impl StrictScore {
         let families: Vec<Option<&Family>> = std::iter::once(None)
             .chain(families.into_iter().map(Some))
             .collect();
-        let of_family = |family: Option<&Family>| -> Vec<&Group<'_>> {
-            groups
-                .iter()
-                .filter(|group| family.is_none() || group.family == family)
-                .collect()
-        };
         let mut cells = Vec::new();
         for subject in 0..grid.subjects.len() {
             for family in &families {
-                let groups = of_family(*family);
+                let groups = family_groups(&groups, *family);
                 for mode in ReadingMode::ALL {
                     cells.extend(cell(grid, subject, *family, &groups, mode));
                 }
             }
         }
-        let chance = families.iter().map(|family| GroupChance {
-            family: family.cloned(),
-            share: chance(grid, &of_family(*family)),
-        });
-        let count =
-            |counts: fn(&Group<'_>) -> bool| groups.iter().filter(|group| counts(group)).count();
         Some(Self {
             cells,
-            chance: chance.collect(),
+            chance: families
+                .iter()
+                .map(|family| GroupChance {
+                    family: family.cloned(),
+                    share: chance(grid, &family_groups(&groups, *family)),
+                })
+                .collect(),
             groups: groups.len(),
-            single: count(|group| group.size == 1),
-            across_frames: count(|group| {
-                group
-                    .questions
-                    .iter()
-                    .map(|question| &question.frame)
-                    .collect::<BTreeSet<_>>()
-                    .len()
-                    > 1
-            }),
-            never_complete: count(|group| !group.is_complete()),
+            single: groups.iter().filter(|group| group.size == 1).count(),
+            across_frames: groups
+                .iter()
+                .map(|group| group.questions.iter().map(|question| &question.frame))
+                .filter(|frames| frames.clone().collect::<BTreeSet<_>>().len() > 1)
+                .count(),
+            never_complete: groups.iter().filter(|group| !group.is_complete()).count(),
         })
     }
 
@@ -189,12 +179,6 @@ fn groups<'a>(grid: &Grid<'_>, questions: &'a [RunQuestion]) -> Vec<Group<'a>> {
 /// Puts groups that share a cluster of the grid into one cluster, so that groups of different clusters are independent.
 fn join_clusters(grid: &Grid<'_>, groups: &mut [Group<'_>]) {
     let mut roots: Vec<usize> = (0..groups.len()).collect();
-    let root = |roots: &[usize], mut group: usize| {
-        while roots[group] != group {
-            group = roots[group];
-        }
-        group
-    };
     let mut first = HashMap::<u32, usize>::new();
     for (index, group) in groups.iter().enumerate() {
         for item in &group.items {
@@ -207,6 +191,22 @@ fn join_clusters(grid: &Grid<'_>, groups: &mut [Group<'_>]) {
     for (index, group) in groups.iter_mut().enumerate() {
         group.cluster = root(&roots, index);
     }
+}
+
+/// Groups of a family; all groups without one.
+fn family_groups<'g, 'a>(groups: &'g [Group<'a>], family: Option<&Family>) -> Vec<&'g Group<'a>> {
+    groups
+        .iter()
+        .filter(|group| family.is_none() || group.family == family)
+        .collect()
+}
+
+/// Follows parents up to the root of a group.
+fn root(parents: &[usize], mut group: usize) -> usize {
+    while parents[group] != group {
+        group = parents[group];
+    }
+    group
 }
 
 impl Group<'_> {

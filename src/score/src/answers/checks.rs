@@ -66,10 +66,9 @@ pub fn shares(checks: &Checks) -> Vec<CheckedShare> {
                 .filter(|check| check.person == *person)
                 .filter(|check| family.is_none_or(|family| check.family == *family))
                 .collect();
-            let found = |finding| share(&own, |check| check.finding == finding);
-            if let (Some(wrong), Some(ambiguous)) =
-                (found(CheckFinding::Wrong), found(CheckFinding::Ambiguous))
-            {
+            let [wrong, ambiguous] = [CheckFinding::Wrong, CheckFinding::Ambiguous]
+                .map(|finding| share(&own, |check| check.finding == finding));
+            if let (Some(wrong), Some(ambiguous)) = (wrong, ambiguous) {
                 shares.push(CheckedShare {
                     person: person.clone(),
                     family: family.cloned(),
@@ -115,24 +114,18 @@ fn agreement(checks: &Checks, [first, second]: [&String; 2]) -> Option<CheckAgre
         let (same, counts) = scenes.entry(&one.scene).or_default();
         same.replies += 1;
         same.right += u32::from(one.finding == other.finding);
-        let [a, b] = [one, other].map(|check| check.finding == CheckFinding::Right);
-        let one_if = |right: bool| f64::from(u8::from(right));
-        counts.all += 1.0;
-        counts.both += one_if(a && b);
-        counts.first += one_if(a);
-        counts.second += one_if(b);
+        let is_right = [one, other].map(|check| check.finding == CheckFinding::Right);
+        counts.add_item(is_right);
     }
     let (same, counts): (Vec<ClusterCount>, Vec<AgreementCounts>) = scenes.into_values().unzip();
-    let total = |of: fn(&AgreementCounts) -> f64| counts.iter().map(of).sum::<f64>();
-    let all = total(|counts| counts.all);
-    let share = |of| total(of) / all;
+    let total = AgreementCounts::total(&counts);
     Some(CheckAgreement {
         people: [first.clone(), second.clone()],
         same: Estimate::clustered(&same)?,
         kappa: kappa(
-            share(|counts| counts.both),
-            share(|counts| counts.first),
-            share(|counts| counts.second),
+            total.both / total.all,
+            total.first / total.all,
+            total.second / total.all,
         ),
         interval: clustered_kappa(&counts).map(|kappa| [kappa.low, kappa.high]),
     })
@@ -145,17 +138,17 @@ mod tests {
     /// Fifty questions: both find 20 right and 15 wrong, the second 10 more right, the first 5 more.
     fn checks(people: [&str; 2]) -> Checks {
         use CheckFinding::{Ambiguous, Right, Wrong};
-        let both = |i: usize| match i {
-            0..20 => [Right, Right],
-            20..35 => [Wrong, Wrong],
-            35..45 => [Ambiguous, Right],
-            _ => [Right, Wrong],
-        };
         (0..50)
             .flat_map(|i| {
+                let findings = match i {
+                    0..20 => [Right, Right],
+                    20..35 => [Wrong, Wrong],
+                    35..45 => [Ambiguous, Right],
+                    _ => [Right, Wrong],
+                };
                 people
                     .into_iter()
-                    .zip(both(i))
+                    .zip(findings)
                     .map(move |(person, finding)| {
                         let check = Check {
                             person: person.to_owned(),

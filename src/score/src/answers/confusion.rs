@@ -6,8 +6,8 @@ use crate::choice::ReadingMode;
 use crate::comparisons::paired::PairedComparison;
 use crate::estimate::{ClusterCount, Estimate};
 use crate::grid::{Grid, GridItem};
+use crate::model_in_condition::ModelInCondition;
 use crate::significance::ALPHA;
-use crate::subject::ModelInCondition;
 use darkqa_ground::types::{AxisLevel, Family};
 
 /// Maximum number of different answers of a family that gets a confusion table.
@@ -66,12 +66,9 @@ fn counts(grid: &Grid<'_>, subject: usize, family: &Family, labels: &[String]) -
         let Some(chosen) = result.reading(ReadingMode::Strict) else {
             continue;
         };
-        let position = |index: usize| {
-            let text = item.asked.choices.get(index)?;
-            labels.binary_search(text).ok()
-        };
-        if let Some(truth) = item.asked.truth.and_then(position) {
-            let predicted = chosen.and_then(|index| position(usize::from(index)));
+        let [truth, predicted] = [item.asked.truth, chosen.map(usize::from)]
+            .map(|index| labels.binary_search(item.asked.choices.get(index?)?).ok());
+        if let Some(truth) = truth {
             counts[truth][predicted.unwrap_or(labels.len())] += 1;
         }
     }
@@ -82,11 +79,13 @@ impl Confusion {
     /// Number of times that each answer was given, and number of times that it was true.
     #[must_use]
     pub fn shares(&self) -> Vec<(usize, usize)> {
-        let predicted = |label: usize| self.counts.iter().map(|row| row[label]).sum();
         self.counts
             .iter()
             .enumerate()
-            .map(|(label, row)| (predicted(label), row.iter().sum()))
+            .map(|(label, row)| {
+                let predicted = self.counts.iter().map(|row| row[label]).sum();
+                (predicted, row.iter().sum())
+            })
             .collect()
     }
 }
@@ -152,17 +151,21 @@ impl AgainstClean {
             }
         }
         let own = times.get(answer).copied().unwrap_or(0);
-        let is_given = |item: &GridItem<'_>, chosen: Option<u8>| {
-            let given = chosen.and_then(|index| item.asked.choices.get(usize::from(index)));
-            given.is_some_and(|given| given == answer)
-        };
-        let paired = |mode| {
-            let has = |_: usize, item: &GridItem<'_>| item.is_in_family(Some(family));
-            PairedComparison::counting(grid, [subject, clean], mode, has, is_given)
-        };
+        let [strict, lenient] = ReadingMode::ALL.map(|mode| {
+            PairedComparison::counting(
+                grid,
+                [subject, clean],
+                mode,
+                |_, item| item.is_in_family(Some(family)),
+                |item, chosen| {
+                    let given = chosen.and_then(|index| item.asked.choices.get(usize::from(index)));
+                    given.is_some_and(|given| given == answer)
+                },
+            )
+        });
         Some(Self {
-            strict: paired(ReadingMode::Strict)?,
-            lenient: paired(ReadingMode::Lenient)?,
+            strict: strict?,
+            lenient: lenient?,
             is_commonest: times.values().all(|times| *times <= own),
             p_report: [None; 2],
         })
@@ -179,9 +182,10 @@ impl AgainstClean {
 
     /// True if the answer is shown to be more common than at L0, in both parsings and after the correction over all sentences.
     fn is_detected(&self) -> bool {
-        let is_small = |p: &Option<f64>| p.is_some_and(|p| p < ALPHA);
-        let is_more = |paired: &PairedComparison| paired.difference.value > 0.0;
-        self.p_report.iter().all(is_small) && is_more(&self.strict) && is_more(&self.lenient)
+        let is_more_frequent = [&self.strict, &self.lenient]
+            .iter()
+            .all(|paired| paired.difference.value > 0.0);
+        is_more_frequent && self.p_report.iter().all(|p| p.is_some_and(|p| p < ALPHA))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::confident_reply::usable_probabilities;
 use crate::grid::Grid;
-use crate::subject::ModelInCondition;
+use crate::model_in_condition::ModelInCondition;
 use darkqa_ground::types::View;
 
 /// Returns, for each item, its cluster and the Jensen–Shannon distance, from 0 to 1, between the probabilities of a subject and those of
@@ -27,19 +27,19 @@ pub(super) fn distances(grid: &Grid<'_>, subject: usize) -> Vec<(u32, f64)> {
 
 /// Jensen–Shannon distance of two distributions.
 fn distance(one: &[f64], other: &[f64]) -> f64 {
-    let part = |p: f64, middle: f64| {
-        if p > 0.0 {
-            p * libm::log2(p / middle)
-        } else {
-            0.0
-        }
-    };
     let divergence: f64 = one
         .iter()
         .zip(other)
         .map(|(&p, &q)| {
             let middle = f64::midpoint(p, q);
-            f64::midpoint(part(p, middle), part(q, middle))
+            let [a, b] = [p, q].map(|p| {
+                if p > 0.0 {
+                    p * libm::log2(p / middle)
+                } else {
+                    0.0
+                }
+            });
+            f64::midpoint(a, b)
         })
         .sum();
     divergence.clamp(0.0, 1.0).sqrt()

@@ -116,11 +116,11 @@ mod tests {
         let expected = 0.3 * 0.3 - 0.6 * 0.4 / 29.0;
         assert!((squared_error(&made, |_| 1) - expected).abs() < 1e-12);
         // A cluster that counts twice contributes two replies.
-        let times = |cluster: u32| if cluster == 0 { 2 } else { 1 };
+        let error = squared_error(&made, |cluster| if cluster == 0 { 2 } else { 1 });
         let (accuracy, n) = (19.0 / 31.0, 31.0);
         let gap: f64 = 0.9 - accuracy;
         let expected = gap * gap - accuracy * (1.0 - accuracy) / (n - 1.0);
-        assert!((squared_error(&made, times) - expected).abs() < 1e-12);
+        assert!((error - expected).abs() < 1e-12);
     }
 
     #[test]

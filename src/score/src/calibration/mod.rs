@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 use super::bootstrap::Resamples;
 use super::estimate::Estimate;
 use super::grid::Grid;
-use super::subject::ModelInCondition;
+use super::model_in_condition::ModelInCondition;
 use confident_reply::{ConfidentReply, accuracy, confident_replies};
 use darkqa_ground::types::AxisLevel;
 use darkqa_statistics::auc::{Auc, PairCounts, RankedReply};
@@ -90,7 +90,6 @@ fn calibration(grid: &Grid<'_>, draws: &Resamples, subject: usize) -> Option<Cal
         return None;
     }
     let n = replies.len();
-    let mean = |number: fn(&ConfidentReply) -> f64| ratio(draws, replies, number, |_| 1.0);
     let skill = ratio(draws, replies, |reply| reply.brier, |reply| reply.guess);
     let error = (n >= MIN_ERROR_REPLIES).then(|| expected_error::estimate(draws, replies));
     Some(Calibration {
@@ -98,7 +97,7 @@ fn calibration(grid: &Grid<'_>, draws: &Resamples, subject: usize) -> Option<Cal
         replies: n,
         reasoned: sorted.reasoned,
         unstated: sorted.unstated,
-        confidence: mean(|reply| reply.confidence),
+        confidence: mean(draws, replies, |reply| reply.confidence),
         accuracy: accuracy(grid.clusters, replies)?,
         overconfidence: TestedConfidence::new(
             grid.clusters,
@@ -106,14 +105,14 @@ fn calibration(grid: &Grid<'_>, draws: &Resamples, subject: usize) -> Option<Cal
         )?,
         growth: growth(grid, subject, replies),
         error,
-        brier: mean(|reply| reply.brier),
+        brier: mean(draws, replies, |reply| reply.brier),
         skill: Estimate {
             value: 1.0 - skill.value,
             low: 1.0 - skill.high,
             high: 1.0 - skill.low,
             n,
         },
-        nll: mean(|reply| reply.nll),
+        nll: mean(draws, replies, |reply| reply.nll),
         risk: RiskCoverage::new(replies),
         auroc: auroc(grid.clusters, replies),
         blind_shift: blind_shift(grid, draws, subject),
@@ -152,6 +151,15 @@ fn blind_shift(grid: &Grid<'_>, draws: &Resamples, subject: usize) -> Option<Est
     (!terms.is_empty()).then(|| ratio_of_sums(draws, &terms))
 }
 
+/// Mean of a quantity over the replies.
+fn mean(
+    draws: &Resamples,
+    replies: &[ConfidentReply],
+    quantity: fn(&ConfidentReply) -> f64,
+) -> Estimate {
+    ratio(draws, replies, quantity, |_| 1.0)
+}
+
 /// Ratio of the sums of two quantities over the replies, with its interval by the cluster bootstrap.
 fn ratio(
     draws: &Resamples,
@@ -174,14 +182,14 @@ fn ratio_of_sums(draws: &Resamples, terms: &[(u32, f64, f64)]) -> Estimate {
         sums[0] += numerator;
         sums[1] += denominator;
     }
-    let drawn_sums = |side: usize| {
+    let [numerators, denominators] = [0, 1].map(|side| {
         let sums: Vec<f32> = by_cluster.iter().map(|sums| sums[side] as f32).collect();
         draws.sums(&sums)
-    };
+    });
     // Draws of clusters without a reply have no ratio.
-    let ratios = drawn_sums(0)
+    let ratios = numerators
         .into_iter()
-        .zip(drawn_sums(1))
+        .zip(denominators)
         .filter(|(_, denominator)| *denominator > 0.0)
         .map(|(numerator, denominator)| numerator / denominator)
         .collect();
@@ -195,12 +203,15 @@ fn ratio_of_sums(draws: &Resamples, terms: &[(u32, f64, f64)]) -> Estimate {
 
 /// Area under the ROC curve of confidence for right against wrong replies.
 fn auroc(clusters: usize, replies: &[ConfidentReply]) -> Option<Auc> {
-    let ranked = replies.iter().map(|reply| RankedReply {
-        cluster: reply.cluster,
-        number: reply.confidence,
-        right: reply.right,
-    });
+    let mut ranked: Vec<RankedReply> = replies
+        .iter()
+        .map(|reply| RankedReply {
+            cluster: reply.cluster,
+            number: reply.confidence,
+            right: reply.right,
+        })
+        .collect();
     let mut pairs = PairCounts::new(clusters);
-    pairs.add(&mut ranked.collect::<Vec<_>>());
+    pairs.add(&mut ranked);
     pairs.auc()
 }

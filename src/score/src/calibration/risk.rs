@@ -34,14 +34,14 @@ impl RiskCoverage {
                 risks.push(wrong / (risks.len() + 1) as f64);
             }
         }
-        let at = |share: f64| {
-            let taken = ((share * n as f64).ceil() as usize).clamp(1, n);
+        let [at_100, at_80, at_50] = [1.0, 0.8, 0.5].map(|coverage| {
+            let taken = ((coverage * n as f64).ceil() as usize).clamp(1, n);
             risks[taken - 1]
-        };
+        });
         Self {
-            at_100: at(1.0),
-            at_80: at(0.8),
-            at_50: at(0.5),
+            at_100,
+            at_80,
+            at_50,
             area: risks.iter().sum::<f64>() / n as f64,
         }
     }

@@ -4,7 +4,7 @@ use super::comparison::{ComparisonKind, pairs};
 use crate::choice::ReadingMode;
 use crate::estimate::{ClusterCount, Estimate};
 use crate::grid::Grid;
-use crate::subject::ModelInCondition;
+use crate::model_in_condition::ModelInCondition;
 use darkqa_statistics::quantiles::{degrees_of_freedom, student};
 
 /// Agreement of two models in one condition, in the strict parsing.
@@ -30,6 +30,26 @@ pub struct AgreementCounts {
     pub first: f64,
     /// Number of these items that the second model got right.
     pub second: f64,
+}
+
+impl AgreementCounts {
+    /// Counts an item, given whether each model got it right.
+    pub(crate) fn add_item(&mut self, [first, second]: [bool; 2]) {
+        self.all += 1.0;
+        self.both += f64::from(first && second);
+        self.first += f64::from(first);
+        self.second += f64::from(second);
+    }
+
+    /// Counts over the items of all clusters.
+    pub(crate) fn total(clusters: &[Self]) -> Self {
+        clusters.iter().fold(Self::default(), |sum, counts| Self {
+            all: sum.all + counts.all,
+            both: sum.both + counts.both,
+            first: sum.first + counts.first,
+            second: sum.second + counts.second,
+        })
+    }
 }
 
 /// Agreement of each model with itself between two kinds of images of the same scenes: dark photographs against synthetic images, and
@@ -60,20 +80,15 @@ fn agreement(grid: &Grid<'_>, first: usize, second: usize) -> Option<Agreement> 
     let mut same = vec![ClusterCount::default(); grid.clusters];
     let mut counts = vec![AgreementCounts::default(); grid.clusters];
     for (index, item) in grid.items.iter().enumerate() {
-        let reading = |subject| grid.result(subject, index).reading(ReadingMode::Strict);
-        let (Some(a), Some(b)) = (reading(first), reading(second)) else {
+        let [a, b] =
+            [first, second].map(|subject| grid.result(subject, index).reading(ReadingMode::Strict));
+        let (Some(a), Some(b)) = (a, b) else {
             continue;
         };
         let cluster = item.cluster as usize;
         same[cluster].replies += 1;
         same[cluster].right += u32::from(a.is_some() && a == b);
-        let (a, b) = (item.is_right(a), item.is_right(b));
-        let one_if = |right: bool| f64::from(u8::from(right));
-        let cluster = &mut counts[cluster];
-        cluster.all += 1.0;
-        cluster.both += one_if(a && b);
-        cluster.first += one_if(a);
-        cluster.second += one_if(b);
+        counts[cluster].add_item([a, b].map(|chosen| item.is_right(chosen)));
     }
     Some(Agreement {
         first: grid.subjects[first].clone(),
@@ -94,20 +109,22 @@ const MIN_CLUSTERS: usize = 8;
 /// residuals of the clusters.
 #[must_use]
 pub fn clustered_kappa(counts: &[AgreementCounts]) -> Option<Estimate> {
-    let in_clusters = |holds: fn(&AgreementCounts) -> bool| {
-        counts.iter().filter(|counts| holds(counts)).count() >= MIN_CLUSTERS
-    };
-    let vary = in_clusters(|r| r.first > 0.0)
-        && in_clusters(|r| r.second > 0.0)
-        && in_clusters(|r| r.first < r.all)
-        && in_clusters(|r| r.second < r.all);
+    let conditions: [fn(&AgreementCounts) -> bool; 4] = [
+        |r| r.first > 0.0,
+        |r| r.second > 0.0,
+        |r| r.first < r.all,
+        |r| r.second < r.all,
+    ];
+    let vary = conditions
+        .iter()
+        .all(|holds| counts.iter().filter(|r| holds(r)).count() >= MIN_CLUSTERS);
     if !vary {
         return None;
     }
-    let total = |of: fn(&AgreementCounts) -> f64| counts.iter().map(of).sum::<f64>();
-    let all = total(|r| r.all);
-    let both = total(|r| r.both) / all;
-    let (a, b) = (total(|r| r.first) / all, total(|r| r.second) / all);
+    let total = AgreementCounts::total(counts);
+    let all = total.all;
+    let both = total.both / all;
+    let (a, b) = (total.first / all, total.second / all);
     let value = kappa(both, a, b)?;
     // κ = 2 (both − ab) / (a + b − 2ab).
     let denominator = a + b - 2.0 * a * b;
@@ -140,8 +157,10 @@ pub fn clustered_kappa(counts: &[AgreementCounts]) -> Option<Estimate> {
 pub(crate) fn kappa(both: f64, first: f64, second: f64) -> Option<f64> {
     let observed = 1.0 - first - second + 2.0 * both;
     let expected = first * second + (1.0 - first) * (1.0 - second);
-    let varies = |share: f64| share > 0.0 && share < 1.0;
-    (varies(first) && varies(second)).then(|| (observed - expected) / (1.0 - expected))
+    [first, second]
+        .iter()
+        .all(|share| *share > 0.0 && *share < 1.0)
+        .then(|| (observed - expected) / (1.0 - expected))
 }
 
 #[cfg(test)]
@@ -156,20 +175,21 @@ mod tests {
         assert!((kappa(0.25, 0.5, 0.5).unwrap()).abs() < 1e-12);
     }
 
+    /// A cluster of one item.
+    fn item(first: bool, second: bool) -> AgreementCounts {
+        let mut counts = AgreementCounts::default();
+        counts.add_item([first, second]);
+        counts
+    }
+
     #[test]
     fn the_interval_is_that_of_independent_pairs() {
         // One item a cluster: 20, 5, 10 and 15 of 50 are right by both, the first, the second and neither.
-        let cell = |both: u8, first: u8, second: u8| AgreementCounts {
-            all: 1.0,
-            both: f64::from(both),
-            first: f64::from(first),
-            second: f64::from(second),
-        };
         let counts = [
-            vec![cell(1, 1, 1); 20],
-            vec![cell(0, 1, 0); 5],
-            vec![cell(0, 0, 1); 10],
-            vec![cell(0, 0, 0); 15],
+            vec![item(true, true); 20],
+            vec![item(true, false); 5],
+            vec![item(false, true); 10],
+            vec![item(false, false); 15],
         ]
         .concat();
         let estimate = clustered_kappa(&counts).unwrap();
@@ -184,9 +204,9 @@ mod tests {
         );
         // Errors in seven clusters only are too few for an interval of the first model.
         let few = [
-            vec![cell(1, 1, 1); 40],
-            vec![cell(0, 0, 1); 7],
-            vec![cell(0, 1, 0); 9],
+            vec![item(true, true); 40],
+            vec![item(false, true); 7],
+            vec![item(true, false); 9],
         ]
         .concat();
         assert_eq!(clustered_kappa(&few), None);

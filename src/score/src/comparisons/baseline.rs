@@ -1,12 +1,13 @@
 //! Comparison of new runs with an old one: [`BaselineRow`].
 
 use super::comparison::MIN_PAIRS;
+use super::holm_of;
 use super::paired::PairedComparison;
 use crate::accuracies::Health;
 use crate::choice::ReadingMode;
 use crate::grid::Grid;
-use crate::significance::{ALPHA, Significance, holm, least_p};
-use crate::subject::ModelInCondition;
+use crate::model_in_condition::ModelInCondition;
+use crate::significance::{ALPHA, Significance, least_p};
 
 /// Comparison of a model in a condition between the new runs and the old one.
 #[derive(Debug, Clone, PartialEq)]
@@ -49,32 +50,32 @@ pub fn baseline_rows(
     pairs: &[(usize, usize)],
     cost: impl Fn(usize) -> Option<f64>,
 ) -> Vec<BaselineRow> {
-    let side = |subject: usize| BaselineSide {
-        replies: health[subject].replies,
-        unread: health[subject].unreadable(),
-        failed: health[subject].failures(),
-        cost: cost(subject),
-    };
     let mut rows: Vec<BaselineRow> = pairs
         .iter()
         .filter_map(|&(new, old)| {
-            let image = |subject, item| grid.trial(subject, item)?.sent_digest();
-            let is_other = |item| {
-                image(new, item)
-                    .zip(image(old, item))
-                    .is_some_and(|(new, old)| new != old)
-            };
+            let has_other_image: Vec<bool> = (0..grid.items.len())
+                .map(|item| {
+                    let [new, old] =
+                        [new, old].map(|subject| grid.trial(subject, item)?.sent_digest());
+                    new.zip(old).is_some_and(|(new, old)| new != old)
+                })
+                .collect();
             let mode = ReadingMode::Strict;
             Some(BaselineRow {
                 subject: grid.subjects[new].clone(),
                 paired: PairedComparison::on_items(grid, new, old, mode, |item, _| {
-                    !is_other(item)
+                    !has_other_image[item]
                 })?,
                 holm: 1.0,
                 significance: Significance::TooFew,
                 detectable: f64::INFINITY,
-                other_images: (0..grid.items.len()).filter(|item| is_other(*item)).count(),
-                sides: [side(new), side(old)],
+                other_images: has_other_image.iter().filter(|is_other| **is_other).count(),
+                sides: [new, old].map(|subject| BaselineSide {
+                    replies: health[subject].replies,
+                    unread: health[subject].unreadable(),
+                    failed: health[subject].failures(),
+                    cost: cost(subject),
+                }),
             })
         })
         .collect();
@@ -90,12 +91,8 @@ pub fn baseline_rows(
 
 /// Applies Holm's correction to the tests of these rows, so that the probability of any false verdict is at most 5 %.
 fn correct(mut rows: Vec<&mut BaselineRow>) {
-    let adjusted = |of: fn(&PairedComparison) -> f64| {
-        let values = rows.iter().map(|row| of(&row.paired));
-        holm(&values.collect::<Vec<_>>())
-    };
-    let corrected = adjusted(|paired| paired.p);
-    let least = adjusted(|paired| least_p(paired.clusters));
+    let corrected = holm_of(rows.iter().map(|row| row.paired.p));
+    let least = holm_of(rows.iter().map(|row| least_p(row.paired.clusters)));
     let level = ALPHA / rows.len() as f64;
     for ((row, holm), least) in rows.iter_mut().zip(corrected).zip(least) {
         row.holm = holm;

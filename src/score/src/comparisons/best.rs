@@ -4,14 +4,15 @@ use std::collections::BTreeSet;
 use std::ops::Range;
 
 use super::comparison::compares_models;
+use super::holm_of;
 use super::paired::{ClusterNet, PairedTest};
 use super::pooled::pool;
 use crate::accuracies::{Coverage, shared};
 use crate::choice::ReadingMode;
 use crate::estimate::{ClusterCount, Estimate};
 use crate::grid::Grid;
-use crate::significance::{ALPHA, Significance, SwapMethod, holm, least_p};
-use crate::subject::ModelInCondition;
+use crate::model_in_condition::ModelInCondition;
+use crate::significance::{ALPHA, Significance, SwapMethod, least_p};
 use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{AxisLevel, Variant};
 
@@ -317,15 +318,13 @@ impl Scores {
         levels: &[AxisLevel],
         mode: ReadingMode,
     ) -> Self {
-        let subject = |model: &str, level| {
-            grid.find_up_to_group(&ModelInCondition::with_images(model, level, variant, None))
-        };
         let subjects: Vec<Vec<usize>> = models
             .iter()
             .map(|model| {
                 levels
                     .iter()
-                    .filter_map(|level| subject(model, *level))
+                    .map(|level| ModelInCondition::with_images(model, *level, variant, None))
+                    .filter_map(|subject| grid.find_up_to_group(&subject))
                     .collect()
             })
             .collect();
@@ -336,16 +335,19 @@ impl Scores {
             all_clusters: grid.clusters,
         };
         for (index, item) in grid.items.iter().enumerate() {
-            let right = subjects.iter().map(|levels| {
-                levels
-                    .iter()
-                    .map(|subject: &usize| {
-                        let reading = grid.result(*subject, index).reading(mode);
-                        reading.map(|chosen| item.is_right(chosen))
-                    })
-                    .collect()
-            });
-            let Some(right) = right.collect::<Option<Vec<Vec<bool>>>>() else {
+            let right: Option<Vec<Vec<bool>>> = subjects
+                .iter()
+                .map(|levels| {
+                    levels
+                        .iter()
+                        .map(|subject| {
+                            let reading = grid.result(*subject, index).reading(mode);
+                            reading.map(|chosen| item.is_right(chosen))
+                        })
+                        .collect()
+                })
+                .collect();
+            let Some(right) = right else {
                 let is_asked = subjects.iter().any(|levels| {
                     levels
                         .iter()
@@ -425,16 +427,19 @@ impl Scores {
             .collect();
         let clean = Estimate::clustered(&clean_counts)?;
         let chance = self.items.iter().map(|item| item.guess).sum::<f64>() / n as f64;
-        let lost = |item: &ItemScores| {
-            item.right(model, &dark) - item.right(model, &(0..1)) * dark.len() as i64
-        };
+        let loss = (clean.low > chance).then(|| {
+            self.test(dark.len(), |item| {
+                item.right(model, &dark) - item.right(model, &(0..1)) * dark.len() as i64
+            })
+            .difference
+        });
         Some(DarkAccuracy {
             model: name.to_owned(),
             mean: Estimate::from_scores(&sums, count, n)?,
             lighter: by_level[..split].iter().sum::<f64>() / split as f64,
             by_level,
             clean,
-            loss: (clean.low > chance).then(|| self.test(dark.len(), lost).difference),
+            loss,
         })
     }
 
@@ -455,7 +460,7 @@ impl Scores {
                 });
             }
         }
-        let corrected = holm(&pairs.iter().map(|pair| pair.p).collect::<Vec<_>>());
+        let corrected = holm_of(pairs.iter().map(|pair| pair.p));
         let least_holm = pairs.len() as f64 * least_p(self.clusters());
         for (pair, holm) in pairs.iter_mut().zip(corrected) {
             pair.holm = holm;
@@ -468,15 +473,20 @@ impl Scores {
     /// model, or if their order changes more than once.
     fn crossing(&self, models: &[(DarkAccuracy, usize)], levels: &[AxisLevel]) -> Option<Crossing> {
         let (dark, dark_index) = models.first()?;
-        let by_lighter = |a: &&(DarkAccuracy, usize), b: &&(DarkAccuracy, usize)| {
-            a.0.lighter.total_cmp(&b.0.lighter)
-        };
         // `rev`, because `max_by` returns the last of equal elements; the first one is better in the dark.
-        let (light, light_index) = models.iter().rev().max_by(by_lighter)?;
-        let ahead = |level: usize| light.by_level[level] - dark.by_level[level];
-        let split = (1..self.levels).find(|split| ahead(*split) < 0.0)?;
-        let changes_once = (0..split).all(|level| ahead(level) >= 0.0)
-            && (split..self.levels).all(|level| ahead(level) <= 0.0);
+        let (light, light_index) = models
+            .iter()
+            .rev()
+            .max_by(|(a, _), (b, _)| a.lighter.total_cmp(&b.lighter))?;
+        let lead_by_level: Vec<f64> = light
+            .by_level
+            .iter()
+            .zip(&dark.by_level)
+            .map(|(light, dark)| light - dark)
+            .collect();
+        let split = (1..self.levels).find(|level| lead_by_level[*level] < 0.0)?;
+        let changes_once = lead_by_level[..split].iter().all(|lead| *lead >= 0.0)
+            && lead_by_level[split..].iter().all(|lead| *lead <= 0.0);
         if !changes_once || dark_index == light_index {
             return None;
         }

@@ -64,13 +64,16 @@ impl Claim {
 mod tests {
     use super::*;
 
-    #[test]
-    fn detection_needs_both_parsings_in_one_direction() {
-        let finding = |gain: f64, p: f64| ParsedFinding {
+    fn finding(gain: f64, p: f64) -> ParsedFinding {
+        ParsedFinding {
             gain,
             verdict: Significance::Worse,
             p_report: Some(p),
-        };
+        }
+    }
+
+    #[test]
+    fn detection_needs_both_parsings_in_one_direction() {
         for (strict, lenient, expected) in [
             (
                 (-0.2, 0.01),

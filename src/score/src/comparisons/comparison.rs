@@ -5,11 +5,12 @@ mod real_synthetic;
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::claim::{Claim, ParsedFinding};
+use super::holm_of;
 use super::paired::PairedComparison;
 use crate::choice::ReadingMode;
 use crate::grid::Grid;
-use crate::significance::{Significance, holm, least_p};
-use crate::subject::{ModelInCondition, models_under_test};
+use crate::model_in_condition::{ModelInCondition, models_under_test};
+use crate::significance::{Significance, least_p};
 use darkqa_ground::types::{AxisLevel, Family, PairDark, Variant, View};
 use rayon::prelude::*;
 
@@ -119,12 +120,12 @@ impl Comparison {
     /// Statement that sentences may make.
     #[must_use]
     pub fn claim(&self) -> Claim {
-        let parsed = |tested: &TestedComparison| ParsedFinding {
+        let [strict, lenient] = [&self.strict, &self.lenient].map(|tested| ParsedFinding {
             gain: tested.paired.difference.value,
             verdict: tested.significance,
             p_report: tested.p_report,
-        };
-        Claim::new(parsed(&self.strict), parsed(&self.lenient))
+        });
+        Claim::new(strict, lenient)
     }
 
     /// Comparison in a parsing.
@@ -169,11 +170,10 @@ type Job<'a> = (ComparisonKind, Option<&'a Family>, usize, usize);
 fn uncorrected(grid: &Grid<'_>, jobs: Vec<Job<'_>>) -> Vec<Comparison> {
     jobs.into_par_iter()
         .filter_map(|(kind, family, first, second)| {
-            let paired = |mode| PairedComparison::new(grid, first, second, family, mode);
-            let strict = paired(ReadingMode::Strict)?;
+            let strict = PairedComparison::new(grid, first, second, family, ReadingMode::Strict)?;
             let differs = grid.parsings_differ(first) || grid.parsings_differ(second);
             let lenient = if differs {
-                paired(ReadingMode::Lenient)?
+                PairedComparison::new(grid, first, second, family, ReadingMode::Lenient)?
             } else {
                 strict.clone()
             };
@@ -202,18 +202,22 @@ pub(crate) fn lights_between(grid: &Grid<'_>, names: &[String]) -> Vec<Compariso
         .collect();
     let mut pairs = Vec::new();
     for (position, (index, subject)) in named.iter().enumerate() {
-        let others = named[position + 1..]
-            .iter()
-            .filter(|(_, other)| other.model != subject.model && is_other_light(subject, other));
-        pairs.extend(others.map(|(other, _)| (*index, *other)));
+        pairs.extend(
+            named[position + 1..]
+                .iter()
+                .filter(|(_, other)| other.model != subject.model && is_other_light(subject, other))
+                .map(|(other, _)| (*index, *other)),
+        );
     }
-    let families = grid.groups();
-    let jobs = families.iter().flat_map(|family| {
-        pairs
-            .iter()
-            .map(|(first, second)| (ComparisonKind::Light, *family, *first, *second))
-    });
-    corrected(uncorrected(grid, jobs.collect()))
+    let mut jobs = Vec::new();
+    for family in grid.groups() {
+        jobs.extend(
+            pairs
+                .iter()
+                .map(|(first, second)| (ComparisonKind::Light, family, *first, *second)),
+        );
+    }
+    corrected(uncorrected(grid, jobs))
 }
 
 /// Fills in the significance of the comparisons, after Holm's correction within each set.
@@ -228,13 +232,10 @@ fn corrected(mut all: Vec<Comparison>) -> Vec<Comparison> {
         sets.entry(set).or_default().push(index);
     }
     for set in sets.into_values() {
-        let values = |of: fn(&Comparison) -> f64| -> Vec<f64> {
-            let values = set.iter().map(|index| of(&all[*index]));
-            holm(&values.collect::<Vec<_>>())
-        };
-        let strict = values(|found| found.strict.paired.p);
-        let lenient = values(|found| found.lenient.paired.p);
-        let least = values(|found| least_p(found.strict.paired.clusters));
+        let own = set.iter().map(|index| &all[*index]);
+        let strict = holm_of(own.clone().map(|found| found.strict.paired.p));
+        let lenient = holm_of(own.clone().map(|found| found.lenient.paired.p));
+        let least = holm_of(own.map(|found| least_p(found.strict.paired.clusters)));
         for (position, index) in set.into_iter().enumerate() {
             let comparison = &mut all[index];
             let is_too_small = comparison.is_too_small();
@@ -364,18 +365,11 @@ fn is_other_light(one: &ModelInCondition, other: &ModelInCondition) -> bool {
 
 /// Indices of the same model without images; if it was never asked without images, of all models without images.
 fn blind(grid: &Grid<'_>, subject: &ModelInCondition) -> Vec<usize> {
-    let all = || {
-        grid.subjects
-            .iter()
-            .enumerate()
-            .filter(|(_, other)| other.view == Some(View::Blind))
-    };
-    let same_model: Vec<usize> = all()
-        .filter(|(_, other)| other.model == subject.model)
-        .map(|(index, _)| index)
-        .collect();
+    let (same_model, others) = (0..grid.subjects.len())
+        .filter(|index| grid.subjects[*index].view == Some(View::Blind))
+        .partition::<Vec<_>, _>(|index| grid.subjects[*index].model == subject.model);
     if same_model.is_empty() {
-        all().map(|(index, _)| index).collect()
+        others
     } else {
         same_model
     }

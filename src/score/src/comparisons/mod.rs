@@ -3,7 +3,7 @@
 mod agreement;
 mod baseline;
 mod best;
-mod by_reading;
+mod by_profile;
 mod claim;
 mod comparison;
 pub mod paired;
@@ -16,9 +16,9 @@ pub use agreement::{Agreement, AgreementCounts, clustered_kappa};
 pub(super) use agreement::{agreements, kappa, light_agreements};
 pub use baseline::{BaselineRow, BaselineSide, baseline_rows};
 pub use best::{BestInTheDark, Crossing, DarkAccuracy, DarkPair, best_in_the_dark};
-pub(super) use by_reading::by_reading;
-pub use by_reading::{
-    EffectInReading, FindingByReading, NoiseHypothesis, Robustness, Support, TestedEffect,
+pub(super) use by_profile::by_profile;
+pub use by_profile::{
+    EffectInProfile, FindingByProfile, NoiseHypothesis, Robustness, Support, TestedEffect,
 };
 pub use claim::Claim;
 pub use comparison::{Comparison, ComparisonKind, MIN_PAIRS, TestedComparison, compares_models};
@@ -27,3 +27,8 @@ pub(super) use pooled::models_left_out;
 pub use pooled::{ModelsLeftOut, PooledDifference, PooledFinding, pool, pooled};
 pub use pooled_kind::PooledKind;
 pub use ranks::{RankRange, rank_ranges};
+
+/// p-values after the Holm correction.
+fn holm_of(p_values: impl Iterator<Item = f64>) -> Vec<f64> {
+    crate::significance::holm(&p_values.collect::<Vec<_>>())
+}

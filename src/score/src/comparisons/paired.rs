@@ -62,8 +62,9 @@ impl PairedComparison {
         mode: ReadingMode,
         has: impl Fn(usize, &GridItem<'_>) -> bool,
     ) -> Option<Self> {
-        let is_right = |item: &GridItem<'_>, chosen| item.is_right(chosen);
-        Self::counting(grid, [first, second], mode, has, is_right)
+        Self::counting(grid, [first, second], mode, has, |item, chosen| {
+            item.is_right(chosen)
+        })
     }
 
     /// Compares two subjects by the replies for which `counts` is true, instead of right replies; it takes an item and a parsed reply.
@@ -80,8 +81,8 @@ impl PairedComparison {
             if !has(index, item) {
                 continue;
             }
-            let reading = |subject| grid.result(subject, index).reading(mode);
-            let (Some(a), Some(b)) = (reading(first), reading(second)) else {
+            let [a, b] = [first, second].map(|subject| grid.result(subject, index).reading(mode));
+            let (Some(a), Some(b)) = (a, b) else {
                 continue;
             };
             let (a, b) = (counts(item, a), counts(item, b));
@@ -93,14 +94,12 @@ impl PairedComparison {
             counted[1] += usize::from(b);
         }
         clusters.retain(|cluster| cluster.all > 0);
-        let sum = |of: fn(&ClusterPairs) -> u32| -> usize {
-            clusters.iter().map(|cluster| of(cluster) as usize).sum()
-        };
-        let n = sum(|cluster| cluster.all);
+        let n: usize = clusters.iter().map(|pairs| pairs.all as usize).sum();
         if n == 0 {
             return None;
         }
-        let (gained, lost) = (sum(|pairs| pairs.gained), sum(|pairs| pairs.lost));
+        let gained: usize = clusters.iter().map(|pairs| pairs.gained as usize).sum();
+        let lost: usize = clusters.iter().map(|pairs| pairs.lost as usize).sum();
         let nets: Vec<ClusterNet> = clusters
             .iter()
             .map(|cluster| ClusterNet {
@@ -373,13 +372,18 @@ mod tests {
         // 24 differences in the same direction: spread over 12 clusters of 20, or in two of them.
         let spread = estimate(&[(20, 2, 0); 12]);
         let clumped = estimate(&[vec![(20, 12, 0); 2], vec![(20, 0, 0); 10]].concat());
-        let width = |estimate: Estimate| estimate.high - estimate.low;
         assert!((spread.value - clumped.value).abs() < 1e-12);
         // √(12 / 11 · Σr² + 2) / 242 with Σr² = 2 · 10² + 10 · 2²; κ = 12 · (2 · 10⁴ + 10 · 2⁴) / 240² = 4.2.
         let half = student(12.0 / 3.2) * f64::sqrt(12.0 / 11.0 * 240.0 + 2.0) / 242.0;
-        assert!((width(clumped) - 2.0 * half).abs() < 1e-9, "{clumped:?}");
+        assert!(
+            (clumped.high - clumped.low - 2.0 * half).abs() < 1e-9,
+            "{clumped:?}"
+        );
         let half = student(11.0) * f64::sqrt(2.0) / 242.0;
-        assert!((width(spread) - 2.0 * half).abs() < 1e-9, "{spread:?}");
+        assert!(
+            (spread.high - spread.low - 2.0 * half).abs() < 1e-9,
+            "{spread:?}"
+        );
     }
 
     #[test]

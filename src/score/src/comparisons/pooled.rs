@@ -9,12 +9,13 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use rayon::prelude::*;
 
+use super::holm_of;
 use super::paired::{ClusterNet, PairedTest};
 use super::pooled_kind::PooledKind;
 use crate::accuracies::{Coverage, Lacking, shared};
 use crate::grid::{Grid, TrialResult};
-use crate::significance::{Significance, holm, least_p};
-use crate::subject::{ModelInCondition, pooled_models};
+use crate::model_in_condition::{ModelInCondition, pooled_models};
+use crate::significance::{Significance, least_p};
 use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{AxisLevel, EnhancerName, Family, Variant, View};
 
@@ -36,11 +37,11 @@ fn models<'g>(grid: &'g Grid<'_>, view: View) -> Vec<&'g str> {
     let asked = grid
         .subjects
         .iter()
-        .filter(|subject| subject.view == Some(view));
-    let models = grid
-        .listing
-        .without_people(asked.map(|subject| &*subject.model));
-    pooled_models(models).into_iter().collect()
+        .filter(|subject| subject.view == Some(view))
+        .map(|subject| &*subject.model);
+    pooled_models(grid.listing.without_people(asked))
+        .into_iter()
+        .collect()
 }
 
 /// A kind, variant and enhancer; Holm's correction is applied to each family of such a set.
@@ -80,13 +81,11 @@ impl PooledSet {
         other: &str,
         level: AxisLevel,
     ) -> Option<(usize, usize)> {
-        let with_images = |level, variant, enhancer| {
-            ModelInCondition::with_images(model, level, variant, enhancer)
-        };
-        let first = with_images(level, &self.variant, self.enhancer.as_ref());
+        let first =
+            ModelInCondition::with_images(model, level, &self.variant, self.enhancer.as_ref());
         let second = match self.kind {
             PooledKind::Darkness | PooledKind::Hallucination(_) => {
-                with_images(AxisLevel::L0, &self.variant, None)
+                ModelInCondition::with_images(model, AxisLevel::L0, &self.variant, None)
             }
             PooledKind::Noise => {
                 let base = Variant {
@@ -95,9 +94,11 @@ impl PooledSet {
                     pair: None,
                     group: self.variant.group.clone(),
                 };
-                with_images(level, &base, None)
+                ModelInCondition::with_images(model, level, &base, None)
             }
-            PooledKind::Enhancer => with_images(level, &self.variant, None),
+            PooledKind::Enhancer => {
+                ModelInCondition::with_images(model, level, &self.variant, None)
+            }
             PooledKind::Blind => ModelInCondition::new(other, None),
         };
         Some((grid.find(&first)?, grid.find_up_to_group(&second)?))
@@ -400,25 +401,20 @@ fn finding(
     }
     let replies = (each * answered.len()) as f64;
     let strict = difference(grid, &answered, each, |side| side.strict);
-    let differ =
-        |(_, sides): &(u32, [SideCounts; 2])| sides.iter().any(|side| side.strict != side.lenient);
-    let lenient = if answered.iter().any(differ) {
+    let parsings_differ = answered
+        .iter()
+        .flat_map(|(_, sides)| sides)
+        .any(|side| side.strict != side.lenient);
+    let lenient = if parsings_differ {
         difference(grid, &answered, each, |side| side.lenient)
     } else {
         strict
     };
-    let read = |side: usize| {
-        answered
-            .iter()
-            .map(|(_, sides)| f64::from(sides[side].read))
-            .sum::<f64>()
-            / replies
-    };
     let clusters: BTreeSet<u32> = answered.iter().map(|(cluster, _)| *cluster).collect();
-    let names = |side: usize| {
+    let [names, blind_names] = [0, 1].map(|side| {
         let names: BTreeSet<&str> = models.iter().map(|pair| pair[side]).collect();
         names.into_iter().map(str::to_owned).collect()
-    };
+    });
     Some(PooledFinding {
         kind: set.kind,
         family: family.cloned(),
@@ -426,15 +422,21 @@ fn finding(
         enhancer: set.enhancer.clone(),
         level,
         mean_over: Vec::new(),
-        models: names(0),
+        models: names,
         blind_models: if set.kind == PooledKind::Blind {
-            names(1)
+            blind_names
         } else {
             Vec::new()
         },
         strict,
         lenient,
-        format: [read(0), read(1)],
+        format: [0, 1].map(|side| {
+            answered
+                .iter()
+                .map(|(_, sides)| f64::from(sides[side].read))
+                .sum::<f64>()
+                / replies
+        }),
         levels: 1,
         items: answered.len(),
         dropped,
@@ -466,10 +468,10 @@ fn difference(
     }
     clusters.retain(|cluster| cluster.items > 0);
     let tested = PairedTest::new(&clusters, each as f64, squares as f64);
-    let mean = |count: u64| count as f64 / each as f64 / answered.len() as f64;
+    let [first, second] = sums.map(|count| count as f64 / each as f64 / answered.len() as f64);
     PooledDifference {
-        first: mean(sums[0]),
-        second: mean(sums[1]),
+        first,
+        second,
         difference: tested.difference,
         p: tested.p,
         p_by: tested.by,
@@ -481,10 +483,9 @@ fn difference(
 
 /// Fills in the verdicts of the findings of one set, after Holm's correction.
 fn corrected(mut set: Vec<PooledFinding>) -> Vec<PooledFinding> {
-    let adjusted = |of: fn(&PooledFinding) -> f64| holm(&set.iter().map(of).collect::<Vec<_>>());
-    let least = adjusted(|finding| finding.least_p);
-    let strict = adjusted(|finding| finding.strict.p);
-    let lenient = adjusted(|finding| finding.lenient.p);
+    let least = holm_of(set.iter().map(|finding| finding.least_p));
+    let strict = holm_of(set.iter().map(|finding| finding.strict.p));
+    let lenient = holm_of(set.iter().map(|finding| finding.lenient.p));
     let levels = set.len();
     for (index, finding) in set.iter_mut().enumerate() {
         finding.levels = levels;

@@ -86,16 +86,17 @@ mod tests {
         }
     }
 
+    /// Ranges of ranks of four models.
+    fn ranges(shown: &[(&str, &str, Significance)]) -> Vec<(usize, usize)> {
+        rank_ranges(&best(&["a", "b", "c", "d"], shown))
+            .into_iter()
+            .map(|rank| (rank.first, rank.last))
+            .collect()
+    }
+
     #[test]
     fn ties_share_their_places() {
         use Significance::{Better, NotShown, TooFewClusters, Worse};
-        let all = ["a", "b", "c", "d"];
-        let ranges = |shown: &[(&str, &str, Significance)]| {
-            rank_ranges(&best(&all, shown))
-                .into_iter()
-                .map(|rank| (rank.first, rank.last))
-                .collect::<Vec<_>>()
-        };
         // No difference is detected, whether or not the clusters allow it.
         let unshown = [("a", "b", NotShown), ("a", "c", TooFewClusters)];
         assert_eq!(ranges(&unshown), [(1, 4); 4]);

@@ -1,7 +1,7 @@
 //! Open answers and their outcomes: [`ScoredAnswer`], [`AnswerOutcome`].
 
 use crate::choice::llm_match::points;
-use crate::subject::ModelInCondition;
+use crate::model_in_condition::ModelInCondition;
 
 /// Outcome of an open answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::answer::{AnswerOutcome, ScoredAnswer};
 use super::group::Group;
 use crate::estimate::Estimate;
-use crate::subject::ModelInCondition;
+use crate::model_in_condition::ModelInCondition;
 
 /// Maximum number of independent binary replies that one mark may count as. A mark on a five-step scale varies less than a binary reply
 /// with the same mean, unless all marks are 1 or 5.
@@ -45,7 +45,7 @@ pub(super) fn cell(
     subject: &ModelInCondition,
     group: &Group,
     answers: &[&ScoredAnswer],
-    cluster: impl Fn(usize) -> usize,
+    clusters: &[usize],
 ) -> OpenCell {
     let count = |outcome| {
         answers
@@ -56,7 +56,7 @@ pub(super) fn cell(
     let mut sums = BTreeMap::<usize, (f64, f64)>::new();
     for answer in answers {
         if let Some(points) = answer.outcome.points() {
-            let (sum, n) = sums.entry(cluster(answer.question)).or_default();
+            let (sum, n) = sums.entry(clusters[answer.question]).or_default();
             (*sum, *n) = (*sum + points, *n + 1.0);
         }
     }

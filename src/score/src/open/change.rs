@@ -6,7 +6,7 @@ use super::answer::ScoredAnswer;
 use super::group::Group;
 use crate::comparisons::paired::difference;
 use crate::estimate::Estimate;
-use crate::subject::ModelInCondition;
+use crate::model_in_condition::ModelInCondition;
 use darkqa_ground::types::{AxisLevel, View};
 
 /// Subject that a score is compared with.
@@ -33,16 +33,19 @@ pub(super) fn baselines(subject: &ModelInCondition) -> Vec<(Baseline, ModelInCon
     let Some(level) = subject.level.filter(|_| subject.view == Some(View::Image)) else {
         return Vec::new();
     };
-    let with_images = |level, enhancer| {
-        ModelInCondition::with_images(&subject.model, level, &subject.variant, enhancer)
-    };
-    let is_clean = level == AxisLevel::L0 && subject.enhancer.is_none();
-    let clean = (!is_clean).then(|| (Baseline::Clean, with_images(AxisLevel::L0, None)));
-    let raw = subject
-        .enhancer
-        .is_some()
-        .then(|| (Baseline::Raw, with_images(level, None)));
-    clean.into_iter().chain(raw).collect()
+    let is_enhanced = subject.enhancer.is_some();
+    let has_clean = level != AxisLevel::L0 || is_enhanced;
+    let clean = has_clean.then_some((Baseline::Clean, AxisLevel::L0));
+    let raw = is_enhanced.then_some((Baseline::Raw, level));
+    clean
+        .into_iter()
+        .chain(raw)
+        .map(|(baseline, level)| {
+            let (model, variant) = (&subject.model, &subject.variant);
+            let other = ModelInCondition::with_images(model, level, variant, None);
+            (baseline, other)
+        })
+        .collect()
 }
 
 /// Mean of the first answers minus mean of the second, on the questions for which both have a score. Several answers to one question, by
@@ -51,9 +54,9 @@ pub(super) fn change(
     first: &[&ScoredAnswer],
     second: &[&ScoredAnswer],
     in_group: impl Fn(usize) -> bool,
-    cluster: impl Fn(usize) -> usize,
+    clusters: &[usize],
 ) -> Option<Estimate> {
-    let means = |answers: &[&ScoredAnswer]| {
+    let [first, second] = [first, second].map(|answers| {
         let mut means = BTreeMap::<usize, (f64, f64)>::new();
         for answer in answers.iter().filter(|answer| in_group(answer.question)) {
             if let Some(points) = answer.outcome.points() {
@@ -62,15 +65,14 @@ pub(super) fn change(
             }
         }
         means
-    };
-    let (first, second) = (means(first), means(second));
+    });
     let mut sums = BTreeMap::<usize, (f64, f64)>::new();
     let (mut squares, mut n) = (0.0, 0);
     for (question, (sum, count)) in &first {
         let Some((other, others)) = second.get(question) else {
             continue;
         };
-        let (net, pairs) = sums.entry(cluster(*question)).or_default();
+        let (net, pairs) = sums.entry(clusters[*question]).or_default();
         let change = sum / count - other / others;
         (*net, *pairs) = (*net + change, *pairs + 1.0);
         squares += change * change;

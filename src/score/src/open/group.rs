@@ -61,17 +61,12 @@ pub(super) fn groups(questions: &[QuestionGroups]) -> Vec<Group> {
         .iter()
         .map(|question| &question.category)
         .collect();
-    let several = |names: BTreeSet<&String>, make: fn(String) -> Group| {
-        let several = names.len() > 1;
-        names
-            .into_iter()
-            .filter(move |_| several)
-            .cloned()
-            .map(make)
-            .collect::<Vec<_>>()
-    };
-    std::iter::once(Group::All)
-        .chain(several(splits, Group::Split))
-        .chain(several(categories, Group::Category))
-        .collect()
+    let mut groups = vec![Group::All];
+    if splits.len() > 1 {
+        groups.extend(splits.into_iter().cloned().map(Group::Split));
+    }
+    if categories.len() > 1 {
+        groups.extend(categories.into_iter().cloned().map(Group::Category));
+    }
+    groups
 }

@@ -15,7 +15,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use self::cell::cell;
 use self::change::{baselines, change};
 use self::group::groups;
-use super::subject::ModelInCondition;
+use super::model_in_condition::ModelInCondition;
 use darkqa_ground::types::ModelListing;
 
 pub use answer::{AnswerOutcome, ScoredAnswer};
@@ -89,13 +89,17 @@ pub fn open_summary_listed(
         .zip(0..)
         .collect();
     let by_walk = episodes.len() > 1;
-    let cluster = |question: usize| {
-        if by_walk {
-            episodes[&*questions[question].episode]
-        } else {
-            question
-        }
-    };
+    let clusters: Vec<usize> = questions
+        .iter()
+        .enumerate()
+        .map(|(index, question)| {
+            if by_walk {
+                episodes[&*question.episode]
+            } else {
+                index
+            }
+        })
+        .collect();
     let mut by_subject = BTreeMap::<&ModelInCondition, Vec<&ScoredAnswer>>::new();
     for answer in answers {
         by_subject.entry(&answer.subject).or_default().push(answer);
@@ -112,7 +116,7 @@ pub fn open_summary_listed(
                 .filter(|answer| group.contains(&questions[answer.question]))
                 .copied()
                 .collect();
-            cells.push(cell(subject, group, &in_group, cluster));
+            cells.push(cell(subject, group, &in_group, &clusters));
         }
         for (baseline, other) in baselines(subject) {
             let Some((_, baseline_answers)) = by_subject
@@ -122,8 +126,12 @@ pub fn open_summary_listed(
                 continue;
             };
             for group in &groups {
-                let in_group = |question: usize| group.contains(&questions[question]);
-                let difference = change(answers, baseline_answers, in_group, cluster);
+                let difference = change(
+                    answers,
+                    baseline_answers,
+                    |question| group.contains(&questions[question]),
+                    &clusters,
+                );
                 changes.extend(difference.map(|difference| ScoreChange {
                     subject: (*subject).clone(),
                     baseline,

@@ -55,20 +55,18 @@ fn marks_become_upstreams_score() {
 fn drops_are_of_unrounded_means_on_shared_questions() {
     use AnswerOutcome::{Marked, Missing};
     let questions: Vec<QuestionGroups> = (0..6).map(|i| groups(i / 2, "a")).collect();
-    let marks = |level: &str, marks: [i64; 6]| -> Vec<ScoredAnswer> {
-        let outcome = |mark| if mark == 0 { Missing } else { Marked(mark) };
-        marks
-            .into_iter()
-            .enumerate()
-            .map(|(i, mark)| scored(level, i, outcome(mark)))
-            .collect()
-    };
-    let answers = [
-        marks("L0", [5, 4, 5, 4, 0, 5]),
-        marks("L2-noise", [4, 4, 3, 1, 1, 5]),
-        marks("L2-noise+ruas", [5, 4, 5, 1, 1, 5]),
-    ]
-    .concat();
+    let marks = [
+        ("L0", [5, 4, 5, 4, 0, 5]),
+        ("L2-noise", [4, 4, 3, 1, 1, 5]),
+        ("L2-noise+ruas", [5, 4, 5, 1, 1, 5]),
+    ];
+    let mut answers = Vec::new();
+    for (level, marks) in marks {
+        for (question, mark) in marks.into_iter().enumerate() {
+            let outcome = if mark == 0 { Missing } else { Marked(mark) };
+            answers.push(scored(level, question, outcome));
+        }
+    }
     let summary = open_summary(&answers, &questions);
     let degraded = ModelInCondition::new("m", Some(&"L2-noise".parse().unwrap()));
     let drop = summary

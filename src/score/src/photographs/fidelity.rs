@@ -1,11 +1,12 @@
 //! Relation between the fidelity of images and right answers: [`FidelityFindings`].
 
+use crate::photographs::dot;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use crate::choice::ReadingMode;
 use crate::grid::Grid;
+use crate::model_in_condition::{ModelInCondition, pooled_models};
 use crate::significance::{Significance, holm};
-use crate::subject::{ModelInCondition, pooled_models};
 use darkqa_ground::types::{
     AxisLevel, Digest, EnhancerName, Family, FrameId, ImageFidelity, Variant, View,
 };
@@ -254,16 +255,16 @@ fn rank_correlation(rows: &[ConditionFidelity], index: usize) -> Option<f64> {
     if fidelity.len() < 3 {
         return None;
     }
-    let (a, b) = (ranks(&fidelity), ranks(&accuracy));
     let middle = f64::midpoint(fidelity.len() as f64, 1.0);
-    let product = |a: &[f64], b: &[f64]| -> f64 {
-        a.iter()
-            .zip(b)
-            .map(|(a, b)| (a - middle) * (b - middle))
-            .sum()
-    };
-    let scale = (product(&a, &a) * product(&b, &b)).sqrt();
-    (scale > 0.0).then(|| product(&a, &b) / scale)
+    let [a, b] = [fidelity, accuracy].map(|values| {
+        let mut ranks = ranks(&values);
+        for rank in &mut ranks {
+            *rank -= middle;
+        }
+        ranks
+    });
+    let scale = (dot(&a, &a) * dot(&b, &b)).sqrt();
+    (scale > 0.0).then(|| dot(&a, &b) / scale)
 }
 
 /// Ranks from 1; equal numbers share the mean of their ranks.
@@ -274,8 +275,9 @@ fn ranks(numbers: &[f64]) -> Vec<f64> {
             let below = numbers.iter().filter(|other| *other < number).count();
             let equal = numbers
                 .iter()
-                .filter(|other| other.total_cmp(number).is_eq());
-            below as f64 + f64::midpoint(equal.count() as f64, 1.0)
+                .filter(|other| other.total_cmp(number).is_eq())
+                .count();
+            below as f64 + f64::midpoint(equal as f64, 1.0)
         })
         .collect()
 }

@@ -67,32 +67,37 @@ pub struct PairDarkness {
     pub mean_and_median: Option<[f64; 2]>,
 }
 
+/// Known values of some facts, in ascending order.
+fn sorted(facts: &[PairFacts], of: fn(&PairFacts) -> Option<f64>) -> Vec<f64> {
+    let mut values: Vec<f64> = facts.iter().filter_map(of).collect();
+    values.sort_by(f64::total_cmp);
+    values
+}
+
 impl PairDarkness {
     /// Summarizes the photographs of one name, one for each frame; `None` if no drop is known.
     #[must_use]
     pub fn new(name: &PhotoName, facts: &[PairFacts]) -> Option<Self> {
-        let sorted = |of: fn(&PairFacts) -> Option<f64>| {
-            let mut values: Vec<f64> = facts.iter().filter_map(of).collect();
-            values.sort_by(f64::total_cmp);
-            values
-        };
-        let all = sorted(PairFacts::ev);
-        let at = |share| quantile(&all, share);
-        let ev = [at(0.25)?, at(0.5)?, at(0.75)?];
-        let middle = |of| quantile(&sorted(of), 0.5);
-        let both = |facts: &PairFacts| facts.median.and(facts.mean);
-        let mean_and_median = middle(both).zip(middle(|facts| facts.mean.and(facts.median)));
+        let all = sorted(facts, PairFacts::ev);
+        let ev = [
+            quantile(&all, 0.25)?,
+            quantile(&all, 0.5)?,
+            quantile(&all, 0.75)?,
+        ];
+        let mean = quantile(&sorted(facts, |facts| facts.median.and(facts.mean)), 0.5);
+        let median = quantile(&sorted(facts, |facts| facts.mean.and(facts.median)), 0.5);
+        let matching = quantile(&sorted(facts, PairFacts::matching), 0.5);
         let stated = facts.iter().filter(|facts| facts.stated.is_some()).count();
         Some(Self {
             name: name.clone(),
             frames: all.len(),
             unknown: facts.len() - all.len(),
-            synthesis: middle(PairFacts::matching).unwrap_or(ev[1]),
+            synthesis: matching.unwrap_or(ev[1]),
             ev,
             stated,
             is_lower_bound: stated < facts.len() && ev[1] > PairFacts::MEASURABLE,
             brighter: all.iter().filter(|ev| **ev <= 0.0).count(),
-            mean_and_median: mean_and_median.map(|(mean, median)| [mean, median]),
+            mean_and_median: mean.zip(median).map(|(mean, median)| [mean, median]),
         })
     }
 
@@ -162,13 +167,16 @@ mod tests {
     use super::*;
 
     fn pair(facts: &[(Option<f64>, f64, f64)]) -> PairDarkness {
-        let facts = facts.iter().map(|(stated, mean, median)| PairFacts {
-            stated: *stated,
-            mean: Some(*mean),
-            median: Some(*median),
-            synthesis: Some(*mean),
-        });
-        PairDarkness::new(&PhotoName::numbered(0), &facts.collect::<Vec<_>>()).unwrap()
+        let facts: Vec<PairFacts> = facts
+            .iter()
+            .map(|(stated, mean, median)| PairFacts {
+                stated: *stated,
+                mean: Some(*mean),
+                median: Some(*median),
+                synthesis: Some(*mean),
+            })
+            .collect();
+        PairDarkness::new(&PhotoName::numbered(0), &facts).unwrap()
     }
 
     #[test]

@@ -131,12 +131,12 @@ fn a_group_without_all_replies_is_incomplete_and_not_scored() {
 fn chance_is_the_mean_product_of_one_over_the_choices() {
     let made = records("m", "L0", |_| Some(true));
     // Eleven groups of two questions, one of two groups of one question, and the other question has no group.
-    let group = |item: usize| match item {
+    let questions_in_groups = questions(&made, |item| match item {
         22 => Some("alone".to_owned()),
         23 => None,
         _ => Some(by_frame(item)),
-    };
-    let score = score(&made, &questions(&made, group));
+    });
+    let score = score(&made, &questions_in_groups);
     let chance = score.chance[0].share.unwrap();
     assert!((chance.value - (11.0 / 9.0 + 1.0 / 3.0) / 12.0).abs() < 1e-15);
     assert_eq!((score.groups, score.single), (12, 1));
@@ -180,13 +180,11 @@ fn groups_that_share_a_frame_are_one_cluster() {
 
 #[test]
 fn a_question_asked_again_must_be_right_again() {
-    let first = records("m", "L0", |_| Some(true));
-    let again = records("m", "L0", |item| Some(item != 10));
-    let again = again.into_iter().map(|mut record| {
+    let mut again = records("m", "L0", |item| Some(item != 10));
+    for record in &mut again {
         record.detail.repeat = 1;
-        record
-    });
-    let made: Vec<Record> = first.into_iter().chain(again).collect();
+    }
+    let made = [records("m", "L0", |_| Some(true)), again].concat();
     let all = questions(&made, |item| Some(by_frame(item)));
     let twice = score(&made, &all);
     assert_eq!(strict(&twice, "L0").right, 11);

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use crate::grid::Grid;
+use crate::model_in_condition::ModelInCondition;
 use crate::photographs::pair_darkness::{PairDarkness, pair_facts};
-use crate::subject::ModelInCondition;
 use darkqa_ground::types::degradations::Axis;
 use darkqa_ground::types::{Variant, View};
 
@@ -28,8 +28,13 @@ pub(super) fn equally_dark(grid: &Grid<'_>, photographed: usize) -> Vec<usize> {
                 && other.variant.group == subject.variant.group
         })
         .collect();
-    let is_match = |(index, other): &&(usize, &ModelInCondition)| {
-        other.variant.pair.is_some() && other.variant.synthetic_kind().is_some() && {
+    let matches: Vec<usize> = others
+        .iter()
+        .filter(|(_, other)| {
+            other.variant.pair.is_some() && other.variant.synthetic_kind().is_some()
+        })
+        .map(|(index, _)| *index)
+        .filter(|index| {
             // Images may be made as dark as another photograph of the same frames; these do not match.
             let other_facts = pair_facts(grid, *index);
             let shared: Vec<_> = other_facts
@@ -37,12 +42,7 @@ pub(super) fn equally_dark(grid: &Grid<'_>, photographed: usize) -> Vec<usize> {
                 .filter_map(|(frame, other)| Some((other, facts.get(frame)?)))
                 .collect();
             !shared.is_empty() && shared.iter().all(|(one, other)| one == other)
-        }
-    };
-    let matches: Vec<usize> = others
-        .iter()
-        .filter(is_match)
-        .map(|(index, _)| *index)
+        })
         .collect();
     if !matches.is_empty() {
         return matches;
@@ -55,13 +55,14 @@ pub(super) fn equally_dark(grid: &Grid<'_>, photographed: usize) -> Vec<usize> {
     else {
         return Vec::new();
     };
-    let distance = |of: &ModelInCondition| {
-        let level = of.level.filter(|level| level.axis() == Some(Axis::LIGHT))?;
-        Some((level.value() - darkness.synthesis).abs())
-    };
     let mut nearest = BTreeMap::<&Variant, (f64, usize)>::new();
     for (index, other) in others {
-        if let Some(distance) = distance(other).filter(|distance| *distance <= MAX_DISTANCE_EV) {
+        let distance = other
+            .level
+            .filter(|level| level.axis() == Some(Axis::LIGHT))
+            .map(|level| (level.value() - darkness.synthesis).abs())
+            .filter(|distance| *distance <= MAX_DISTANCE_EV);
+        if let Some(distance) = distance {
             let best = nearest.entry(&other.variant).or_insert((distance, index));
             if distance < best.0 {
                 *best = (distance, index);

@@ -79,12 +79,12 @@ impl PooledFinding {
     /// The statement that sentences may make.
     #[must_use]
     pub fn claim(&self) -> Claim {
-        let parsed = |parsed: &PooledDifference| ParsedFinding {
+        let [strict, lenient] = [&self.strict, &self.lenient].map(|parsed| ParsedFinding {
             gain: self.kind.gain(parsed.difference.value),
             verdict: parsed.verdict,
             p_report: parsed.p_report,
-        };
-        Claim::new(parsed(&self.strict), parsed(&self.lenient))
+        });
+        Claim::new(strict, lenient)
     }
 
     /// True if the level, or every level of a mean, is in the darker part of the ladder: L4 (7.5 EV) and darker, or for another kind of

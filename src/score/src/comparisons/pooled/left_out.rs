@@ -45,12 +45,9 @@ pub(crate) fn models_left_out(grid: &Grid<'_>) -> Vec<ModelsLeftOut> {
             .collect();
         let mut groups = BTreeMap::<(Vec<AxisLevel>, [usize; 2]), BTreeSet<&str>>::new();
         for (model, lacking) in models.left_out {
-            let sum = |side: usize| lacking.iter().map(|(_, items)| items[side]).sum();
+            let items = [0, 1].map(|side| lacking.iter().map(|(_, items)| items[side]).sum());
             let levels = lacking.iter().map(|(level, _)| *level).collect();
-            groups
-                .entry((levels, [sum(0), sum(1)]))
-                .or_default()
-                .insert(model);
+            groups.entry((levels, items)).or_default().insert(model);
         }
         all.extend(
             groups

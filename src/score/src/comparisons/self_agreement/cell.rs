@@ -13,7 +13,7 @@ use crate::choice::ReadingMode;
 use crate::estimate::ClusterCount;
 use crate::estimate::Estimate;
 use crate::grid::{Grid, TrialResult};
-use crate::subject::ModelInCondition;
+use crate::model_in_condition::ModelInCondition;
 use darkqa_ground::types::{AxisLevel, Family, View};
 
 /// Agreement of one subject on one family in one parsing, with the numbers needed to interpret it.

@@ -50,16 +50,15 @@ impl<'g> BankCounts<'g> {
                 continue;
             }
             let asked = item.asked;
-            let text = |index: usize| asked.choices.get(index).map(String::as_str);
-            let light = asked.truth.and_then(text);
-            let here = reading.and_then(|index| text(usize::from(index)));
+            let answers = [asked.truth, reading.map(usize::from)]
+                .map(|index| asked.choices.get(index?).map(String::as_str));
             let whole = counts.whole.entry(question).or_default();
             let of_cluster = (item.cluster, question);
             let of_cluster = counts.by_cluster.entry(of_cluster).or_default();
             for counts in [whole, of_cluster] {
                 counts.items += 1;
                 counts.choices = asked.choices.len();
-                for (side, answer) in [light, here].into_iter().enumerate() {
+                for (side, answer) in answers.into_iter().enumerate() {
                     if let Some(answer) = answer {
                         counts.answers.entry(answer).or_default()[side] += 1;
                     }
@@ -81,8 +80,10 @@ impl<'g> BankCounts<'g> {
                 .whole
                 .values()
                 .filter_map(|counts| {
-                    let answers = counts.answers.values().map(|answers| answers[side]);
-                    entropy(answers, counts.choices)
+                    entropy(
+                        counts.answers.values().map(|answers| answers[side]),
+                        counts.choices,
+                    )
                 })
                 .collect();
             (!entropies.is_empty()).then(|| entropies.iter().sum::<f64>() / entropies.len() as f64)

@@ -7,7 +7,7 @@ use crate::choice::ReadingMode;
 use crate::estimate::ClusterCount;
 use crate::estimate::Estimate;
 use crate::grid::Grid;
-use crate::subject::ModelInCondition;
+use crate::model_in_condition::ModelInCondition;
 use crate::threshold::{LevelCounts, NoThreshold, Threshold};
 use darkqa_ground::types::{AxisLevel, EnhancerName, Family, Variant};
 
@@ -93,16 +93,19 @@ fn share(counts: &[ClusterCount]) -> Option<f64> {
 
 /// Share of the items that agree in each draw; NaN in a draw without replies.
 fn drawn_shares(counts: &[ClusterCount], draws: &Resamples) -> Vec<f64> {
-    let sums = |number: fn(&ClusterCount) -> u32| {
-        let numbers: Vec<f32> = counts.iter().map(|count| number(count) as f32).collect();
-        draws.sums(&numbers)
-    };
-    let (right, replies) = (sums(|count| count.right), sums(|count| count.replies));
-    right
+    let right: Vec<f32> = counts.iter().map(|count| count.right as f32).collect();
+    let replies: Vec<f32> = counts.iter().map(|count| count.replies as f32).collect();
+    draws
+        .sums(&right)
         .iter()
-        .zip(&replies)
+        .zip(&draws.sums(&replies))
         .map(|(right, n)| right / n)
         .collect()
+}
+
+/// Position of an agreement between floor and ceiling, which are at 0 and 1.
+fn position(here: f64, floor: f64, ceiling: f64) -> f64 {
+    (here - floor) / (ceiling - floor)
 }
 
 /// Estimates the position of the agreement G of a condition between the floor B and the ceiling C: (G − B) / (C − B), with the interval of
@@ -112,7 +115,6 @@ pub(super) fn evidence(
     bounds: &Bounds,
     draws: &Resamples,
 ) -> Option<Estimate> {
-    let position = |here: f64, floor: f64, ceiling: f64| (here - floor) / (ceiling - floor);
     let value = position(share(counts)?, share(&bounds.blind)?, share(&bounds.again)?);
     // Draws without replies are dropped. Floor and ceiling coincide in fewer draws than the interval excludes, so its ends are finite.
     let drawn: Vec<f64> = drawn_shares(counts, draws)
@@ -184,10 +186,13 @@ pub(super) fn curves(grid: &Grid<'_>, draws: &Resamples) -> Vec<EvidenceCurve> {
 
 /// Number of agreeing items without an image by cluster, scaled to the number of replies at L0.
 fn floor(bounds: &Bounds) -> Vec<f32> {
-    let replies = |counts: &[ClusterCount]| -> f64 {
-        counts.iter().map(|count| f64::from(count.replies)).sum()
-    };
-    let scale = replies(&bounds.again) / replies(&bounds.blind);
+    let [again, blind] = [&bounds.again, &bounds.blind].map(|counts| {
+        counts
+            .iter()
+            .map(|count| f64::from(count.replies))
+            .sum::<f64>()
+    });
+    let scale = again / blind;
     bounds
         .blind
         .iter()

@@ -103,13 +103,12 @@ impl<'a> LightAnswers<'a> {
     /// Choice of the model at L0 for the question of a trial; `None` if it is unreadable or missing.
     fn reference(&self, trial: TrialRef<'_>, mode: ReadingMode) -> Option<usize> {
         let key = (trial.question(), trial.choices());
-        let group = |trial: TrialRef<'_>| trial.condition().and_then(|at| at.group.clone());
-        let own = group(trial);
+        let own = run_group(trial);
         let light = self
             .by_question
             .get(&key)?
             .iter()
-            .find(|light| RunGroup::overlap(group(**light).as_ref(), own.as_ref()))?;
+            .find(|light| RunGroup::overlap(run_group(**light), own))?;
         chosen(*light, mode)
     }
 
@@ -157,18 +156,19 @@ impl<'a> LightAnswers<'a> {
         let replied: Vec<TrialRef<'_>> = self.first().filter(|trial| !trial.failed()).collect();
         let read = replied
             .iter()
-            .filter(|trial| chosen(**trial, mode).is_some());
-        let is_cannot_tell_reply = |trial: &&TrialRef<'_>| {
-            let choice = chosen(**trial, mode).and_then(|index| trial.choices().get(index));
-            choice.is_some_and(|choice| is_cannot_tell(choice))
-        };
+            .filter(|trial| chosen(**trial, mode).is_some())
+            .count();
         LightReplies {
             model: self.model.to_owned(),
             mode,
             asked: self.by_question.len(),
-            read: Estimate::share(read.count(), replied.len()),
+            read: Estimate::share(read, replied.len()),
             refused: replied.iter().filter(|trial| is_refused(**trial)).count(),
-            cannot_tell: replied.iter().filter(is_cannot_tell_reply).count(),
+            cannot_tell: replied
+                .iter()
+                .filter_map(|trial| trial.choices().get(chosen(*trial, mode)?))
+                .filter(|choice| is_cannot_tell(choice))
+                .count(),
             offers_cannot_tell: self.offers_cannot_tell(),
         }
     }
@@ -183,6 +183,10 @@ impl<'a> LightAnswers<'a> {
             .iter()
             .any(|choices| choices.iter().any(|choice| is_cannot_tell(choice)))
     }
+}
+
+fn run_group(trial: TrialRef<'_>) -> Option<&RunGroup> {
+    trial.condition()?.group.as_ref()
 }
 
 /// Copies trials, each with a new repeat number and a reference answer as the truth.

@@ -83,10 +83,13 @@ pub(super) fn entropy(counts: impl Iterator<Item = usize> + Clone, choices: usiz
     if all == 0 {
         return None;
     }
-    let terms = counts.filter(|count| *count > 0).map(|count| {
-        let share = count as f64 / all as f64;
-        -share * libm::log(share)
-    });
+    let entropy: f64 = counts
+        .filter(|count| *count > 0)
+        .map(|count| {
+            let share = count as f64 / all as f64;
+            -share * libm::log(share)
+        })
+        .sum();
     // Adding 0 turns −0 into 0.
-    Some((terms.sum::<f64>() + 0.0) / libm::log(choices as f64))
+    Some((entropy + 0.0) / libm::log(choices as f64))
 }

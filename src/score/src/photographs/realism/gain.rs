@@ -1,4 +1,4 @@
-//! System gain K estimated from the noise of a real pair, [`GainFit`], and of several pairs, [`ReadingFit`].
+//! System gain K estimated from the noise of a real pair, [`GainFit`], and of several pairs, [`ProfileFit`].
 //!
 //! The gain is estimated by indirect inference (Gourieroux, Monfort and Renault 1993, J. Appl. Econometrics 8:S85): the
 //! statistic of the real image, its [`SpreadCurve`], is compared with that of synthetic images over a ladder of K.
@@ -82,20 +82,18 @@ impl GainFit {
                 outcome: FitOutcome::FewBlocks,
             };
         }
-        let misfit = |index: usize| {
-            let squares = bins.iter().map(|(real, curve)| {
-                let difference = interpolate(curve, index) - real;
-                difference * difference
-            });
-            (squares.sum::<f64>() / bins.len() as f64).sqrt()
-        };
-        let (index, misfit) =
-            (0..FINE)
-                .map(misfit)
-                .enumerate()
-                .fold((0, f64::INFINITY), |best, next| {
-                    if next.1 < best.1 { next } else { best }
+        let (index, misfit) = (0..FINE)
+            .map(|index| {
+                let squares = bins.iter().map(|(real, curve)| {
+                    let difference = interpolate(curve, index) - real;
+                    difference * difference
                 });
+                (squares.sum::<f64>() / bins.len() as f64).sqrt()
+            })
+            .enumerate()
+            .fold((0, f64::INFINITY), |best, next| {
+                if next.1 < best.1 { next } else { best }
+            });
         Self {
             gain: Some(libm::exp(log_gain(index, FINE))),
             misfit: Some(misfit),
@@ -183,9 +181,10 @@ impl PooledGain {
 
 /// Fits of the gain to all pairs under one noise profile.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ReadingFit {
+pub struct ProfileFit {
     /// Name of the noise profile.
-    pub reading: ReadingName,
+    #[serde(rename = "reading")]
+    pub profile: ReadingName,
     /// Ratio r assumed by the fit, if images determine only the product r · K; `None` if r is 2^ΔEV.
     pub ratio: Option<f64>,
     /// Summary of the gains of the fitted pairs; `None` if no pair was fitted.
@@ -202,13 +201,13 @@ pub struct PairFit {
     pub fit: GainFit,
 }
 
-impl ReadingFit {
+impl ProfileFit {
     /// Combines the fits to all pairs.
     #[must_use]
-    pub fn new(reading: ReadingName, ratio: Option<f64>, pairs: Vec<PairFit>) -> Self {
+    pub fn new(profile: ReadingName, ratio: Option<f64>, pairs: Vec<PairFit>) -> Self {
         let gains: Vec<f64> = pairs.iter().filter_map(|pair| pair.fit.fitted()).collect();
         Self {
-            reading,
+            profile,
             ratio,
             pooled: PooledGain::new(&gains),
             pairs,
@@ -261,8 +260,8 @@ mod tests {
 
     #[test]
     fn a_curve_of_another_shape_or_beyond_the_ladder_is_not_fitted() {
-        let wild = |bin: usize| if bin.is_multiple_of(2) { 1.0 } else { 2.0 };
-        let fit = GainFit::fit(&curve(1.0, wild), &synthetic());
+        let uneven = curve(1.0, |bin| if bin.is_multiple_of(2) { 1.0 } else { 2.0 });
+        let fit = GainFit::fit(&uneven, &synthetic());
         assert_eq!((fit.outcome, fit.fitted()), (FitOutcome::Misfit, None));
         assert!((fit.misfit.unwrap() - f64::ln(2.0) / 2.0).abs() < 0.01);
         for gain in [0.001, 900.0] {
@@ -294,21 +293,22 @@ mod tests {
     }
 
     /// A pair is evaluated without its own gain; with fewer than three fitted pairs, the result is marked as using it.
+    /// Fit of pairs with these gains.
+    fn fit_of_pairs(gains: &[Option<f64>]) -> ProfileFit {
+        let pairs = gains.iter().enumerate().map(|(index, gain)| PairFit {
+            pair: index.to_string(),
+            fit: GainFit {
+                gain: *gain,
+                misfit: Some(0.1),
+                outcome: gain.map_or(FitOutcome::Misfit, |_| FitOutcome::Fitted),
+            },
+        });
+        ProfileFit::new(ReadingName::PAPER, Some(200.0), pairs.collect())
+    }
+
     #[test]
     fn no_pair_is_judged_by_its_own_gain() {
-        let fit = |gain: Option<f64>| GainFit {
-            gain,
-            misfit: Some(0.1),
-            outcome: gain.map_or(FitOutcome::Misfit, |_| FitOutcome::Fitted),
-        };
-        let reading = |gains: &[Option<f64>]| {
-            let pairs = gains.iter().enumerate().map(|(index, gain)| PairFit {
-                pair: index.to_string(),
-                fit: fit(*gain),
-            });
-            ReadingFit::new(ReadingName::PAPER, Some(200.0), pairs.collect())
-        };
-        let four = reading(&[Some(0.1), Some(0.2), None, Some(6.0)]);
+        let four = fit_of_pairs(&[Some(0.1), Some(0.2), None, Some(6.0)]);
         assert_eq!(four.pooled.as_ref().unwrap().n, 3);
         for (pair, n, most) in [("0", 2, 6.0), ("2", 3, 6.0), ("3", 2, 0.2)] {
             let (gains, origin) = four.for_pair(pair).unwrap();
@@ -316,8 +316,8 @@ mod tests {
             assert!(gains.range[1] < most, "{pair}: {gains:?}");
             assert!((gains.range[1] > 1.0) == (pair != "3"), "{pair}: {gains:?}");
         }
-        let (gains, origin) = reading(&[Some(0.1), Some(6.0)]).for_pair("0").unwrap();
+        let (gains, origin) = fit_of_pairs(&[Some(0.1), Some(6.0)]).for_pair("0").unwrap();
         assert_eq!((gains.n, origin), (2, CameraOrigin::SamePairs));
-        assert_eq!(reading(&[None, None]).for_pair("0"), None);
+        assert_eq!(fit_of_pairs(&[None, None]).for_pair("0"), None);
     }
 }

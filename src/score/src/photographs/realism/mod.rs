@@ -36,15 +36,17 @@ impl ImageComparison {
     /// Difference of the PSNR in dB, of the SSIM and of the divergence in nats from those of another image of the same pair.
     #[must_use]
     pub fn differences(&self, other: &Self) -> [f64; 3] {
-        let numbers = |image: &Self| [image.psnr, image.ssim, image.kl.nats];
-        let (of_self, of_other) = (numbers(self), numbers(other));
-        std::array::from_fn(|i| {
+        [
+            (self.psnr, other.psnr),
+            (self.ssim, other.ssim),
+            (self.kl.nats, other.kl.nats),
+        ]
+        .map(|(own, other)| {
             // Two perfect images differ by 0, although both have an infinite PSNR.
-            let is_equal = of_self[i].total_cmp(&of_other[i]).is_eq();
-            if is_equal {
+            if own.total_cmp(&other).is_eq() {
                 0.0
             } else {
-                of_self[i] - of_other[i]
+                own - other
             }
         })
     }
@@ -79,7 +81,8 @@ pub struct NoiseComparison {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct NoiseMethod {
     /// Name of the noise profile.
-    pub reading: ReadingName,
+    #[serde(rename = "reading")]
+    pub profile: ReadingName,
     pub camera: CameraOrigin,
 }
 
@@ -114,7 +117,7 @@ impl fmt::Display for NoiseMethod {
             CameraOrigin::OtherPairs => ", gain fitted to the other pairs",
             CameraOrigin::SamePairs => ", gain fitted to the same pairs",
         };
-        f.pad(&format!("{}{fitted}", self.reading))
+        f.pad(&format!("{}{fitted}", self.profile))
     }
 }
 
@@ -149,7 +152,16 @@ pub fn psnr(a: &Rgb, b: &Rgb) -> Result<f64> {
 pub fn exposure_drop(normal: &Rgb, low: &Rgb) -> Result<f32> {
     let linear: [f64; 256] =
         std::array::from_fn(|code| libm::pow((code as f64 / 255.0).max(1e-8), 2.2));
-    let mean = |image: &Rgb| {
+    let images = [normal, low];
+    if images
+        .iter()
+        .any(|image| image.samples().iter().all(|code| *code == 0))
+    {
+        let problem =
+            "an image is black, so its exposure drop cannot be estimated; set it with --ev";
+        return Err(Error::data("pair", problem));
+    }
+    let [normal_light, low_light] = images.map(|image| {
         let mut counts = [0_u64; 256];
         for code in image.samples() {
             counts[usize::from(*code)] += 1;
@@ -160,14 +172,8 @@ pub fn exposure_drop(normal: &Rgb, low: &Rgb) -> Result<f32> {
             .map(|(n, light)| *n as f64 * light)
             .sum::<f64>()
             / image.samples().len() as f64
-    };
-    let is_black = |image: &Rgb| image.samples().iter().all(|code| *code == 0);
-    if is_black(normal) || is_black(low) {
-        let problem =
-            "an image is black, so its exposure drop cannot be estimated; set it with --ev";
-        return Err(Error::data("pair", problem));
-    }
-    Ok(libm::log2(mean(normal) / mean(low)) as f32)
+    });
+    Ok(libm::log2(normal_light / low_light) as f32)
 }
 
 #[cfg(test)]
@@ -193,22 +199,24 @@ mod tests {
 
     #[test]
     fn equal_numbers_do_not_differ_even_if_infinite() {
-        let comparison = |psnr, ssim| ImageComparison {
-            psnr,
-            ssim,
-            kl: residual::Divergence {
-                nats: 0.5,
-                empty: 0,
-            },
-            kl_other: residual::Divergence {
-                nats: 0.5,
-                empty: 0,
-            },
+        let kl = residual::Divergence {
+            nats: 0.5,
+            empty: 0,
         };
-        let perfect = comparison(f64::INFINITY, 1.0);
+        let perfect = ImageComparison {
+            psnr: f64::INFINITY,
+            ssim: 1.0,
+            kl,
+            kl_other: kl,
+        };
         let same = perfect.differences(&perfect);
         assert!(same.iter().all(|difference| difference.abs() < 1e-12));
-        let [psnr, ssim, kl] = comparison(30.0, 0.75).differences(&perfect);
+        let worse = ImageComparison {
+            psnr: 30.0,
+            ssim: 0.75,
+            ..perfect
+        };
+        let [psnr, ssim, kl] = worse.differences(&perfect);
         assert!(psnr.is_infinite() && psnr < 0.0);
         assert!((ssim + 0.25).abs() < 1e-12 && kl.abs() < 1e-12);
     }

@@ -188,14 +188,13 @@ pub fn divergence(
         (Bins::Fu, EmptyBins::Drop) => AddedCount::Nothing,
     };
     let [real, synthetic] = [real, synthetic].map(|counts| shares(&counts, added));
-    let terms = real
+    let nats = real
         .iter()
         .zip(&synthetic)
-        .filter(|(p, q)| **p > 0.0 && **q > 0.0);
-    Divergence {
-        nats: terms.map(|(p, q)| p * libm::log(p / q)).sum(),
-        empty,
-    }
+        .filter(|(p, q)| **p > 0.0 && **q > 0.0)
+        .map(|(p, q)| p * libm::log(p / q))
+        .sum();
+    Divergence { nats, empty }
 }
 
 /// Amount added to each bin.

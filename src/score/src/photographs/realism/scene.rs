@@ -9,6 +9,7 @@
 //! low-light images; 1.00 and 0.86 for a real and a synthetic pair of LOL-v2. An image at 4 EV that is shifted by 2 % of its shorter
 //! side has at least 0.67, by 4 % at least 0.25.
 
+use crate::photographs::dot;
 use darkqa_ground::types::Rgb;
 
 /// Minimum correlation of images of the same scene (chosen, see above).
@@ -38,8 +39,7 @@ impl SceneMatch {
     pub fn new(normal: &Rgb, low: &Rgb, drop_ev: f64) -> Self {
         let [normal, low] = [normal, low].map(BlockMeans::new);
         let (clean, noisy) = (normal.structure(), low.structure());
-        let sum = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        let (squares, others) = (sum(&clean, &clean), sum(&noisy, &noisy));
+        let (squares, others) = (dot(&clean, &clean), dot(&noisy, &noisy));
         let dropped = libm::exp2(-drop_ev / 2.2);
         let signal = dropped * (squares / clean.len().max(1) as f64).sqrt();
         let reach = signal / libm::hypot(signal, low.noise);
@@ -47,7 +47,7 @@ impl SceneMatch {
         Self {
             correlation: is_clear.then(|| {
                 if others > 0.0 {
-                    sum(&clean, &noisy) / (squares * others).sqrt()
+                    dot(&clean, &noisy) / (squares * others).sqrt()
                 } else {
                     0.0
                 }
@@ -94,10 +94,6 @@ impl BlockMeans {
     /// Subtracts from each mean that of the surrounding blocks, then the overall mean. Blocks at the edges are repeated beyond the image.
     fn structure(&self) -> Vec<f64> {
         let [height, width] = self.size;
-        let surrounding = |index: usize, size: usize| {
-            (index..=index + 2 * SURROUNDING_RADIUS)
-                .map(move |other| other.saturating_sub(SURROUNDING_RADIUS).min(size - 1))
-        };
         let mut structure: Vec<f64> = (0..height)
             .flat_map(|row| (0..width).map(move |column| (row, column)))
             .map(|(row, column)| {
@@ -119,15 +115,21 @@ impl BlockMeans {
     }
 }
 
+/// Indices around an index, inside 0..`size`; the ends are repeated.
+fn surrounding(index: usize, size: usize) -> impl Iterator<Item = usize> {
+    (index..=index + 2 * SURROUNDING_RADIUS)
+        .map(move |other| other.saturating_sub(SURROUNDING_RADIUS).min(size - 1))
+}
+
 /// Mean green codes of two halves of a block with the same center: of every eight rows, the outer four and the inner four. Their difference
 /// is noise.
 fn halves(image: &Rgb, [top, left]: [usize; 2], side: usize) -> [f64; 2] {
     let mut sums = [0_u64; 2];
     for row in 0..side {
         let line = &image.samples()[((top + row) * image.width() + left) * 3..][..3 * side];
-        let greens = line.iter().skip(1).step_by(3);
+        let greens = line.iter().skip(1).step_by(3).copied();
         let half = usize::from((2..6).contains(&(row % SIDE_STEP)));
-        sums[half] += greens.map(|code| u64::from(*code)).sum::<u64>();
+        sums[half] += greens.map(u64::from).sum::<u64>();
     }
     sums.map(|sum| sum as f64 / (side * side / 2) as f64)
 }
@@ -167,11 +169,15 @@ mod tests {
     /// The image 4.4 EV darker, under uniform noise of ± `noise` codes.
     fn low(image: &Rgb, noise: f64) -> Rgb {
         let mut dice = Dice(77);
-        let codes = image.samples().iter().map(|code| {
-            let noisy = f64::from(*code) / 4.0 + noise * (2.0 * dice.next() - 1.0);
-            noisy.clamp(0.0, 255.0) as u8
-        });
-        Rgb::new(image.height(), image.width(), codes.collect()).unwrap()
+        let codes = image
+            .samples()
+            .iter()
+            .map(|code| {
+                let noisy = f64::from(*code) / 4.0 + noise * (2.0 * dice.next() - 1.0);
+                noisy.clamp(0.0, 255.0) as u8
+            })
+            .collect();
+        Rgb::new(image.height(), image.width(), codes).unwrap()
     }
 
     #[test]
@@ -200,16 +206,17 @@ mod tests {
         assert!(SceneMatch::new(&normal, &low(&mirrored, 4.0), 4.4).is_of_two_scenes());
     }
 
-    /// Nothing can be said of a bare wall, of structure below the noise, or of very small images.
+    /// Bare walls, structure below the noise and very small images are not judged.
     #[test]
     fn images_without_structure_are_not_judged() {
         let [height, width] = SIZE;
         let wall = Rgb::new(height, width, vec![120; height * width * 3]).unwrap();
-        let flat = |image: &Rgb| {
-            let codes = image.samples().iter().map(|code| 118 + code / 64);
-            Rgb::new(height, width, codes.collect()).unwrap()
-        };
-        let faint = flat(&scene(5));
+        let codes = scene(5)
+            .samples()
+            .iter()
+            .map(|code| 118 + code / 64)
+            .collect();
+        let faint = Rgb::new(height, width, codes).unwrap();
         for (normal, low) in [
             (&wall, low(&wall, 9.0)),
             (&wall, low(&scene(1), 9.0)),

@@ -154,7 +154,6 @@ impl Block {
 
     /// Standard deviation about the least-squares plane, in codes. The plane takes three degrees of freedom.
     fn spread(&self) -> f64 {
-        let centred = |i: usize| i as f64 - (SIDE - 1) as f64 / 2.0;
         // Σ x² over the block, where x is the centred column; Σ y² over centred rows is the same.
         let sum_of_squares = SIDE as f64 * (0..SIDE).map(|i| centred(i) * centred(i)).sum::<f64>();
         let (mut sum_across, mut sum_down) = (0.0, 0.0);
@@ -177,6 +176,11 @@ impl Block {
         }
         (squared_residuals / (SIDE * SIDE - 3) as f64).sqrt()
     }
+}
+
+/// Position in a block relative to its centre, in pixels.
+fn centred(i: usize) -> f64 {
+    i as f64 - (SIDE - 1) as f64 / 2.0
 }
 
 #[cfg(test)]

@@ -162,8 +162,8 @@ impl Kernel for Band<'_> {
                 }
                 if let Some(first) = (line + 1).checked_sub(TAPS) {
                     for (moment, means) in means.iter_mut().enumerate() {
-                        let row = |tap: usize| &recent[(first + tap) % TAPS][moment];
-                        filter_over_rows(means, self.window, std::array::from_fn(row));
+                        let rows = std::array::from_fn(|tap| &recent[(first + tap) % TAPS][moment]);
+                        filter_over_rows(means, self.window, rows);
                     }
                     let mut similarities = similarities(&means);
                     similarities[TILE.min(windows - begin)..].fill(0.0);

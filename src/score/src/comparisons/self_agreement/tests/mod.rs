@@ -110,14 +110,19 @@ fn dark_and_enhanced_images_are_compared_pair_by_pair() {
     };
     let records = model.records(&[("L5-noise+lift", keep), ("L0+lift", half)]);
     found(&records, |found| {
-        let of = |kind, condition: &str| {
+        // An enhancer that harms in the light is compared with the same images asked again.
+        let [dark, lifted, harmed] = [
+            (ComparisonKind::Level, "L5-noise"),
+            (ComparisonKind::Enhancer, "L5-noise+lift"),
+            (ComparisonKind::Enhancer, "L0+lift"),
+        ]
+        .map(|(kind, condition)| {
             found
                 .comparisons
                 .iter()
                 .find(|c| c.kind == kind && c.family.is_none() && c.first.condition() == condition)
                 .unwrap()
-        };
-        let dark = of(ComparisonKind::Level, "L5-noise");
+        });
         assert_eq!(
             (dark.second.condition(), dark.strict.significance),
             ("L0".into(), Significance::Worse)
@@ -126,14 +131,11 @@ fn dark_and_enhanced_images_are_compared_pair_by_pair() {
             (dark.strict.paired.second, dark.strict.paired.gained),
             (1.0, 0)
         );
-        let lifted = of(ComparisonKind::Enhancer, "L5-noise+lift");
         assert_eq!(
             (lifted.strict.significance, lifted.strict.paired.lost),
             (Significance::Better, 0)
         );
         assert!(lifted.strict.holm < 0.001 && lifted.strict.paired.mcnemar < 0.001);
-        // An enhancer that harms in the light is held against the same images asked again.
-        let harmed = of(ComparisonKind::Enhancer, "L0+lift");
         assert_eq!(harmed.strict.significance, Significance::Worse);
         assert!(
             found
@@ -197,8 +199,13 @@ fn nothing_without_a_truth_is_scored_as_an_accuracy() {
     let trials = records.iter().cloned().collect();
     let findings = Findings::new(&trials, &FrameTies::default(), [], &[]);
     assert!(findings.grid.items.is_empty());
-    let mut cells = findings.summary.cells.iter();
-    assert!(cells.all(|cell| cell.accuracy.is_none() && cell.right == 0));
+    assert!(
+        findings
+            .summary
+            .cells
+            .iter()
+            .all(|cell| cell.accuracy.is_none() && cell.right == 0)
+    );
     found(&records, |found| {
         assert!(!found.grid.items.is_empty());
         assert_eq!(

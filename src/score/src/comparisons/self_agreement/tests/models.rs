@@ -154,15 +154,15 @@ fn evidence_is_the_way_from_the_floor_to_the_ceiling() {
         [&dark, &blind, &again].map(AgreementCell::role),
         [CellRole::Other, CellRole::Floor, CellRole::Ceiling]
     );
-    let value = |cell: &AgreementCell| cell.agreement.unwrap().value;
-    let expected = (value(&dark) - value(&blind)) / (value(&again) - value(&blind));
+    let [here, floor, ceiling] = [&dark, &blind, &again].map(|cell| cell.agreement.unwrap().value);
+    let expected = (here - floor) / (ceiling - floor);
     let kept = dark.evidence.unwrap().unwrap();
     assert!((kept.value - expected).abs() < 1e-12);
     assert!(
         kept.low < expected && expected < kept.high && kept.high - kept.low < 0.3,
         "{kept:?}"
     );
-    assert!((value(&again) - 0.9).abs() < 0.03);
+    assert!((ceiling - 0.9).abs() < 0.03);
     assert_eq!((blind.evidence, again.evidence), (None, None));
 }
 

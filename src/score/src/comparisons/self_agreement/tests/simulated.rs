@@ -81,8 +81,8 @@ pub(super) fn record(
 /// The questions as a run stores them.
 pub(super) fn questions() -> Vec<RunQuestion> {
     (0..IMAGES)
-        .flat_map(|image| (0..QUESTIONS).map(move |question| (image, question)))
-        .map(|(image, question): (usize, usize)| RunQuestion {
+        .flat_map(|image| (0..QUESTIONS).map(move |question| [image, question]))
+        .map(|[image, question]: [usize; 2]| RunQuestion {
             id: QuestionId(format!("q{question:02}@i{image:03}")),
             place: image * QUESTIONS + question,
             scene: String::new(),

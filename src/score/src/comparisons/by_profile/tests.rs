@@ -4,14 +4,14 @@ use super::*;
 use crate::tests::{records, with_grid};
 use darkqa_ground::types::Record;
 
-fn find<'f>(found: &'f [FindingByReading], claim: &NoiseHypothesis) -> &'f FindingByReading {
+fn find<'f>(found: &'f [FindingByProfile], claim: &NoiseHypothesis) -> &'f FindingByProfile {
     found
         .iter()
         .find(|finding| finding.claim == *claim)
         .unwrap()
 }
 
-fn standings(finding: &FindingByReading) -> Vec<Option<Support>> {
+fn standings(finding: &FindingByProfile) -> Vec<Option<Support>> {
     finding
         .effects
         .iter()
@@ -34,7 +34,7 @@ fn ladder(paper: fn(usize) -> Option<bool>, physical: fn(usize) -> Option<bool>)
 fn a_claim_holds_where_its_interval_is_on_its_side() {
     let records = ladder(|item| Some(item % 4 == 0), |_| Some(true));
     with_grid(&records, |grid| {
-        let found = by_reading(grid);
+        let found = by_profile(grid);
         let noise = find(&found, &NoiseHypothesis::NoiseCompounds(None));
         assert_eq!(noise.levels.len(), 5);
         assert_eq!(
@@ -50,7 +50,7 @@ fn a_claim_holds_where_its_interval_is_on_its_side() {
             .iter()
             .map(|one| one.effect.unwrap().difference.n);
         assert_eq!(numbers.collect::<Vec<_>>(), [24, 24]);
-        // Seven claims under two readings: the smallest p counts 14 times.
+        // Seven claims under two profiles: the smallest p counts 14 times.
         let smallest = found
             .iter()
             .flat_map(|finding| &finding.effects)
@@ -78,20 +78,20 @@ fn a_claim_holds_where_its_interval_is_on_its_side() {
 fn the_same_everywhere_is_open_and_the_opposite_is_reversed() {
     let same = ladder(|_| Some(true), |_| Some(true));
     with_grid(&same, |grid| {
-        let found = by_reading(grid);
+        let found = by_profile(grid);
         assert!(
             found
                 .iter()
                 .all(|finding| finding.robustness == Robustness::Open)
         );
     });
-    // The exposure drop alone is answered worse than both readings.
+    // Accuracy is lower with the exposure drop alone than with noise under either profile.
     let mut opposite = ladder(|_| Some(true), |_| Some(true));
     for level in 1..=5 {
         opposite.extend(records("m", &format!("L{level}-ev"), |_| Some(false)));
     }
     with_grid(&opposite, |grid| {
-        let found = by_reading(grid);
+        let found = by_profile(grid);
         let noise = find(&found, &NoiseHypothesis::NoiseCompounds(None));
         assert_eq!(standings(noise), [Some(Support::Opposite); 2]);
         assert_eq!(noise.robustness, Robustness::None);
@@ -113,7 +113,7 @@ fn items_without_a_reply_leave_every_column_and_unasked_levels_are_named() {
             != Some("L2-noise@physical")
     });
     with_grid(&records_, |grid| {
-        let found = by_reading(grid);
+        let found = by_profile(grid);
         let noise = find(&found, &NoiseHypothesis::NoiseCompounds(None));
         let levels: Vec<String> = noise.levels.iter().map(ToString::to_string).collect();
         assert_eq!(levels, ["L1", "L3", "L4", "L5"]);
@@ -130,7 +130,7 @@ fn items_without_a_reply_leave_every_column_and_unasked_levels_are_named() {
         let claim = NoiseHypothesis::NoiseCompounds(second.and_then(|subject| subject.level));
         let of_second = find(&found, &claim);
         assert_eq!(standings(of_second), [Some(Support::Holds), None]);
-        // A claim that was not asked under one reading does not hold under all.
+        // A claim that was not asked under one profile does not hold under all.
         assert_eq!(of_second.robustness, Robustness::Some);
     });
 }
@@ -139,8 +139,8 @@ fn items_without_a_reply_leave_every_column_and_unasked_levels_are_named() {
 fn enhancers_and_families_have_claims_of_their_own() {
     let mut all = ladder(|item| Some(item % 2 == 0), |_| Some(true));
     for level in 1..=5 {
-        for reading in ["", "@physical"] {
-            let condition = format!("L{level}-noise{reading}+lift");
+        for profile in ["", "@physical"] {
+            let condition = format!("L{level}-noise{profile}+lift");
             let answers: fn(usize) -> Option<bool> = if level < 4 {
                 |_| Some(false)
             } else {
@@ -151,7 +151,7 @@ fn enhancers_and_families_have_claims_of_their_own() {
     }
     all.extend(records("other", "", |_| Some(true)));
     with_grid(&all, |grid| {
-        let found = by_reading(grid);
+        let found = by_profile(grid);
         let name = EnhancerName::new("lift").unwrap();
         let harms = find(&found, &NoiseHypothesis::EnhancerHarms(name.clone()));
         assert_eq!((harms.levels.len(), harms.robustness), (3, Robustness::All));
@@ -178,11 +178,11 @@ fn enhancers_and_families_have_claims_of_their_own() {
 }
 
 #[test]
-fn one_reading_has_no_table() {
+fn one_profile_has_no_table() {
     let mut all = ladder(|_| Some(false), |_| Some(true));
     all.retain(|record| {
         let condition = record.condition.as_ref().map(ToString::to_string);
         condition.is_none_or(|condition| !condition.contains('@'))
     });
-    with_grid(&all, |grid| assert!(by_reading(grid).is_empty()));
+    with_grid(&all, |grid| assert!(by_profile(grid).is_empty()));
 }

@@ -1,4 +1,4 @@
-//! Findings about noise, tested under each noise profile: [`FindingByReading`].
+//! Findings about noise, tested under each noise profile: [`FindingByProfile`].
 //!
 //! The paper's noise model can be interpreted in several ways; each interpretation is a noise profile. A conclusion that holds under only
 //! one profile is a conclusion about that profile. Each finding is therefore computed under every profile, on the same items and by the
@@ -14,8 +14,8 @@ use super::paired::{ClusterNet, PairedTest};
 use crate::choice::ReadingMode;
 use crate::estimate::Estimate;
 use crate::grid::Grid;
+use crate::model_in_condition::ModelInCondition;
 use crate::significance::{ALPHA, holm};
-use crate::subject::ModelInCondition;
 use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{AxisLevel, EnhancerName, Family, ReadingName, RunGroup, Variant, View};
 
@@ -146,9 +146,9 @@ impl Robustness {
 
 /// Effect of a claim under one noise profile.
 #[derive(Debug, Clone, PartialEq)]
-pub struct EffectInReading {
+pub struct EffectInProfile {
     /// Noise profile.
-    pub reading: ReadingName,
+    pub profile: ReadingName,
     /// Accuracy of the first side minus that of the second, averaged over the levels; `n` is the number of items. `None` if a side was
     /// not asked.
     pub effect: Option<TestedEffect>,
@@ -169,7 +169,7 @@ pub struct TestedEffect {
 
 /// Test results of a claim about one model under every noise profile, on the same items.
 #[derive(Debug, Clone, PartialEq)]
-pub struct FindingByReading {
+pub struct FindingByProfile {
     /// Model.
     pub model: String,
     /// Runs that showed these images, if the runs of the report showed different ones.
@@ -181,7 +181,7 @@ pub struct FindingByReading {
     /// The model asked without images that [`NoiseHypothesis::BelowBlind`] compares with, if it is not `model` itself.
     pub blind: Option<String>,
     /// Effect under each profile of the report, `paper` first.
-    pub effects: Vec<EffectInReading>,
+    pub effects: Vec<EffectInProfile>,
     /// Summary over all profiles.
     pub robustness: Robustness,
     /// Number of items left out because they were asked, but not answered on every side, level and profile.
@@ -190,14 +190,14 @@ pub struct FindingByReading {
 
 /// Tests all claims of each model under every noise profile; empty if the grid has fewer than two profiles.
 #[must_use]
-pub(crate) fn by_reading(grid: &Grid<'_>) -> Vec<FindingByReading> {
-    let readings: BTreeSet<&ReadingName> = noisy_subjects(grid)
+pub(crate) fn by_profile(grid: &Grid<'_>) -> Vec<FindingByProfile> {
+    let profiles: BTreeSet<&ReadingName> = noisy_subjects(grid)
         .filter_map(|subject| subject.variant.reading.as_ref())
         .collect();
-    if readings.len() < 2 {
+    if profiles.len() < 2 {
         return Vec::new();
     }
-    let readings: Vec<&ReadingName> = readings.into_iter().collect();
+    let profiles: Vec<&ReadingName> = profiles.into_iter().collect();
     let models: BTreeSet<(&str, Option<&RunGroup>)> = noisy_subjects(grid)
         .map(|subject| (&*subject.model, subject.variant.group.as_ref()))
         .collect();
@@ -211,11 +211,11 @@ pub(crate) fn by_reading(grid: &Grid<'_>) -> Vec<FindingByReading> {
                 .map(move |claim| (model, group, claim))
         })
         .collect();
-    let findings: Vec<FindingByReading> = tests
+    let findings: Vec<FindingByProfile> = tests
         .into_par_iter()
         .filter_map(|(model, group, claim)| {
             let lookup = SideLookup { grid, model, group };
-            finding(&lookup, claim, &readings)
+            finding(&lookup, claim, &profiles)
         })
         .collect();
     with_holm_correction(findings)
@@ -270,33 +270,43 @@ impl SideLookup<'_, '_> {
         &self,
         claim: &NoiseHypothesis,
         level: AxisLevel,
-        reading: &ReadingName,
+        profile: &ReadingName,
     ) -> Option<(usize, usize)> {
-        let variant = |kind: Option<Kind>, reading: Option<&ReadingName>| Variant {
-            kind,
-            reading: reading.cloned(),
+        let noisy = Variant {
+            kind: Some(Kind::Sensor),
+            reading: Some(profile.clone()),
             pair: None,
             group: self.group.cloned(),
         };
-        let noisy = variant(Some(Kind::Sensor), Some(reading));
-        let subject_index = |level, variant: &Variant, enhancer| {
-            let subject = ModelInCondition::with_images(self.model, level, variant, enhancer);
-            self.grid.find_up_to_group(&subject)
-        };
-        let unenhanced = subject_index(level, &noisy, None);
+        let unenhanced = self.subject_index(level, &noisy, None)?;
         Some(match claim {
-            NoiseHypothesis::NoiseCompounds(_) => (
-                subject_index(level, &variant(Kind::Sensor.base(), None), None)?,
-                unenhanced?,
-            ),
+            NoiseHypothesis::NoiseCompounds(_) => {
+                let base = Variant {
+                    kind: Kind::Sensor.base(),
+                    reading: None,
+                    ..noisy
+                };
+                (self.subject_index(level, &base, None)?, unenhanced)
+            }
             NoiseHypothesis::DarknessCosts => {
-                (unenhanced?, subject_index(AxisLevel::L0, &noisy, None)?)
+                let clean = self.subject_index(AxisLevel::L0, &noisy, None)?;
+                (unenhanced, clean)
             }
             NoiseHypothesis::EnhancerHarms(name) | NoiseHypothesis::EnhancerHelps(name) => {
-                (subject_index(level, &noisy, Some(name))?, unenhanced?)
+                (self.subject_index(level, &noisy, Some(name))?, unenhanced)
             }
-            NoiseHypothesis::BelowBlind(..) => (unenhanced?, self.blind()?),
+            NoiseHypothesis::BelowBlind(..) => (unenhanced, self.blind()?),
         })
+    }
+
+    fn subject_index(
+        &self,
+        level: AxisLevel,
+        variant: &Variant,
+        enhancer: Option<&EnhancerName>,
+    ) -> Option<usize> {
+        let subject = ModelInCondition::with_images(self.model, level, variant, enhancer);
+        self.grid.find_up_to_group(&subject)
     }
 
     /// Index of the same model without images, or else of the only model without images.
@@ -320,21 +330,21 @@ impl SideLookup<'_, '_> {
 fn finding(
     lookup: &SideLookup<'_, '_>,
     claim: NoiseHypothesis,
-    readings: &[&ReadingName],
-) -> Option<FindingByReading> {
-    let levels: Vec<AxisLevel> = readings
+    profiles: &[&ReadingName],
+) -> Option<FindingByProfile> {
+    let levels: Vec<AxisLevel> = profiles
         .iter()
-        .map(|reading| asked_levels(lookup, &claim, reading))
+        .map(|profile| asked_levels(lookup, &claim, profile))
         .filter(|levels| !levels.is_empty())
         .reduce(|shared, levels| &shared & &levels)?
         .into_iter()
         .collect();
-    let pairs: Vec<Vec<(usize, usize)>> = readings
+    let pairs: Vec<Vec<(usize, usize)>> = profiles
         .iter()
-        .map(|reading| {
+        .map(|profile| {
             levels
                 .iter()
-                .map(|level| lookup.find(&claim, *level, reading))
+                .map(|level| lookup.find(&claim, *level, profile))
                 .collect::<Option<_>>()
                 .unwrap_or_default()
         })
@@ -351,18 +361,18 @@ fn finding(
         .then(|| lookup.blind())
         .flatten()
         .map(|index| lookup.grid.subjects[index].model.clone());
-    Some(FindingByReading {
+    Some(FindingByProfile {
         model: lookup.model.to_owned(),
         group: lookup.group.cloned(),
         robustness: Robustness::Open,
         claim,
         levels,
         blind: blind.filter(|name| name != lookup.model),
-        effects: readings
+        effects: profiles
             .iter()
             .zip(effects)
-            .map(|(reading, effect)| EffectInReading {
-                reading: (*reading).clone(),
+            .map(|(profile, effect)| EffectInProfile {
+                profile: (*profile).clone(),
                 effect,
             })
             .collect(),
@@ -374,12 +384,12 @@ fn finding(
 fn asked_levels(
     lookup: &SideLookup<'_, '_>,
     claim: &NoiseHypothesis,
-    reading: &ReadingName,
+    profile: &ReadingName,
 ) -> BTreeSet<AxisLevel> {
     claim
         .levels()
         .into_iter()
-        .filter(|level| lookup.find(claim, *level, reading).is_some())
+        .filter(|level| lookup.find(claim, *level, profile).is_some())
         .collect()
 }
 
@@ -394,7 +404,7 @@ fn shared_items(
         .flatten()
         .flat_map(|(first, second)| [*first, *second])
         .collect();
-    let (kept, dropped): (Vec<usize>, Vec<usize>) = grid
+    let (kept, dropped) = grid
         .items
         .iter()
         .enumerate()
@@ -405,7 +415,7 @@ fn shared_items(
                 .iter()
                 .any(|subject| grid.result(*subject, *item).is_asked())
         })
-        .partition(|item| {
+        .partition::<Vec<_>, _>(|item| {
             subjects
                 .iter()
                 .all(|subject| grid.result(*subject, *item).is_reply())
@@ -423,13 +433,15 @@ fn effect(grid: &Grid<'_>, pairs: &[(usize, usize)], kept: &[usize]) -> Option<T
     let mut sum_of_squares = 0;
     for &index in kept {
         let item = &grid.items[index];
-        let is_right = |subject: usize| {
-            let reading = grid.result(subject, index).reading(ReadingMode::Strict);
-            i64::from(reading.is_some_and(|chosen| item.is_right(chosen)))
-        };
         let net: i64 = pairs
             .iter()
-            .map(|(first, second)| is_right(*first) - is_right(*second))
+            .map(|(first, second)| {
+                let [first, second] = [first, second].map(|subject| {
+                    let reading = grid.result(*subject, index).reading(ReadingMode::Strict);
+                    i64::from(reading.is_some_and(|chosen| item.is_right(chosen)))
+                });
+                first - second
+            })
             .sum();
         let cluster = &mut clusters[item.cluster as usize];
         cluster.net += net;
@@ -447,11 +459,11 @@ fn effect(grid: &Grid<'_>, pairs: &[(usize, usize)], kept: &[usize]) -> Option<T
 }
 
 /// Fills in the corrected p-values, test results and summaries, with Holm's correction over all findings and profiles.
-fn with_holm_correction(mut findings: Vec<FindingByReading>) -> Vec<FindingByReading> {
+fn with_holm_correction(mut findings: Vec<FindingByProfile>) -> Vec<FindingByProfile> {
     let p_values: Vec<f64> = findings
         .iter()
         .flat_map(|finding| &finding.effects)
-        .filter_map(|in_reading| in_reading.effect)
+        .filter_map(|in_profile| in_profile.effect)
         .map(|effect| effect.p)
         .collect();
     let mut corrected = holm(&p_values).into_iter();
@@ -460,7 +472,7 @@ fn with_holm_correction(mut findings: Vec<FindingByReading>) -> Vec<FindingByRea
         for (effect, holm) in finding
             .effects
             .iter_mut()
-            .filter_map(|in_reading| in_reading.effect.as_mut())
+            .filter_map(|in_profile| in_profile.effect.as_mut())
             .zip(&mut corrected)
         {
             effect.holm = holm;
@@ -483,15 +495,15 @@ fn support(effect: &TestedEffect, expects_gain: bool) -> Support {
 }
 
 /// Summarizes a claim over the profiles. A profile that was not asked has no effect, so the claim then cannot hold under all.
-fn robustness(effects: &[EffectInReading]) -> Robustness {
-    let count = |support: Support| {
+fn robustness(effects: &[EffectInProfile]) -> Robustness {
+    let [holding, opposite] = [Support::Holds, Support::Opposite].map(|support| {
         effects
             .iter()
             .filter_map(|effect| effect.effect)
             .filter(|effect| effect.support == support)
             .count()
-    };
-    match (count(Support::Holds), count(Support::Opposite)) {
+    });
+    match (holding, opposite) {
         (0, 0) => Robustness::Open,
         (0, _) => Robustness::None,
         (holding, 0) if holding == effects.len() => Robustness::All,

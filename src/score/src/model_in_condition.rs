@@ -202,9 +202,11 @@ mod tests {
             (&["random"], &["random"], &["random"]),
             (&[], &[], &[]),
         ] {
-            let names = |found: BTreeSet<&'static str>| found.into_iter().collect::<Vec<_>>();
-            assert_eq!(names(models_under_test(models.iter().copied())), expected);
-            assert_eq!(names(pooled_models(models.iter().copied())), pooled);
+            let models = models.iter().copied();
+            let [expected, pooled]: [BTreeSet<&str>; 2] =
+                [expected, pooled].map(|names| names.iter().copied().collect());
+            assert_eq!(models_under_test(models.clone()), expected);
+            assert_eq!(pooled_models(models), pooled);
         }
     }
 
