@@ -318,7 +318,7 @@ impl<'a> ImagePipeline<'a> {
                 enhancer,
                 notes,
             } => {
-                self.note_stored(&notes, &enhancer, [frame, condition])?;
+                self.judge_stored(&notes, &enhancer, [frame, condition])?;
                 Ok(image)
             }
             StagedImage::ToEnhance {
@@ -335,7 +335,7 @@ impl<'a> ImagePipeline<'a> {
     }
 
     /// Notes an image of the store as its enhancer would.
-    fn note_stored(
+    fn judge_stored(
         &mut self,
         notes: &MadeNotes,
         name: &EnhancerName,
@@ -346,11 +346,11 @@ impl<'a> ImagePipeline<'a> {
             return Ok(());
         };
         if let Some(images) = self.steps.recipe.elsewhere(name) {
-            return used.note_made_elsewhere(images.usage(), images.folder(), place, implausible);
+            return used.record_external(images.usage(), images.folder(), place, implausible);
         }
         match self.resting(name) {
-            Some(resting) => used.note_in(resting.usage(), resting.path(), place, implausible),
-            None => self.enhancer(name)?.note_stored(used, place, implausible),
+            Some(resting) => used.record(resting.usage(), resting.path(), place, implausible),
+            None => self.enhancer(name)?.judge_stored(used, place, implausible),
         }
     }
 
@@ -368,11 +368,11 @@ impl<'a> ImagePipeline<'a> {
         }
         let place: [&dyn ToString; 2] = [frame, condition];
         if let Some(resting) = self.resting(name) {
-            let enhance = || resting.enhance_noted(image, place, implausible);
+            let enhance = || resting.enhance_and_judge(image, place, implausible);
             return timings.time(TimedStep::Enhance, enhance);
         }
         let enhancer = self.enhancer(name)?;
-        let enhance = || enhancer.enhance_noted(image, place, implausible);
+        let enhance = || enhancer.enhance_and_judge(image, place, implausible);
         timings.time(TimedStep::Enhance, enhance)
     }
 

@@ -93,7 +93,7 @@ impl Model {
     /// If a number of the sidecar is infinite or NaN.
     pub(crate) fn stated(&self) -> Result<Digest> {
         match self {
-            Self::Read(file) => file.stated(),
+            Self::Read(file) => file.probe_digest(),
             Self::Open(_, stated) => Ok(*stated),
         }
     }
@@ -148,7 +148,7 @@ impl<'a> OpenEnhancers<'a> {
             .into_iter()
             .map(|model| match model {
                 Model::Read(file) => {
-                    let stated = file.stated()?;
+                    let stated = file.probe_digest()?;
                     Ok(Model::Open(self.settings.open(file)?, stated))
                 }
                 open @ Model::Open(..) => Ok(open),

@@ -65,11 +65,11 @@ impl RestingEnhancer {
         &self.usage
     }
 
-    /// Enhances a frame in a condition, and looks at the result, as [`Enhancer::enhance_noted`] does.
+    /// Enhances a frame in a condition, and looks at the result, as [`Enhancer::enhance_and_judge`] does.
     ///
     /// # Errors
     /// If it cannot be opened, which ends the run, or fails on the image.
-    pub(crate) fn enhance_noted(
+    pub(crate) fn enhance_and_judge(
         &self,
         image: &Rgb,
         place: [&dyn ToString; 2],
@@ -86,7 +86,7 @@ impl RestingEnhancer {
             };
         }
         match &mut *state {
-            State::Open(enhancer) => enhancer.enhance_noted(image, place, implausible),
+            State::Open(enhancer) => enhancer.enhance_and_judge(image, place, implausible),
             State::Closed(_) => Err(self.ended("was not opened")),
             State::Failed(problem) => Err(self.ended(problem)),
         }
@@ -97,7 +97,7 @@ impl RestingEnhancer {
             return Err(self.ended("is in use"));
         };
         let enhancer = self.settings.open(file)?;
-        let enhancer = enhancer.tried_before(&self.findings, self.usage.clone())?;
+        let enhancer = enhancer.with_findings(&self.findings, self.usage.clone())?;
         let stopper = self.stopper.get_or_init(|| enhancer.stopper());
         if self.is_stopped.load(Ordering::SeqCst) {
             stopper.stop();

@@ -25,7 +25,7 @@ impl ImagePipeline<'_> {
     pub(crate) fn check<I>(&mut self, sources: &[Source], plan: &[SourcePlan<I>]) -> Result<()> {
         self.try_enhancers(sources, plan)?;
         // What was tried is not counted among the images of the run.
-        self.enhancers.iter_mut().for_each(Enhancer::count_anew);
+        self.enhancers.iter_mut().for_each(Enhancer::reset_counts);
         if let Some(limit) = self.steps.limit {
             warn_of_large(self.largest(sources, plan)?.as_ref(), limit);
         }

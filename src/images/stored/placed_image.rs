@@ -41,7 +41,7 @@ pub(crate) struct Sidecar<R> {
     pub(crate) recipe: R,
     /// Why the image may be wrong although it was made (`--allow bad-enhancer`). It follows from all images of a call, and decides no pixel.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    used_anyway: Option<String>,
+    overruled_problem: Option<String>,
     /// The image file; `None` in files of the first schema.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     output: Option<OutputFile>,
@@ -118,7 +118,7 @@ impl<R: ImageOrigin> Sidecar<R> {
             schema: R::SCHEMAS[0].to_owned(),
             darkqa_eval: env!("CARGO_PKG_VERSION").to_owned(),
             recipe,
-            used_anyway: place.used_anyway.clone(),
+            overruled_problem: place.overruled_problem.clone(),
             output: Some(OutputFile::new(&place.image, bytes)),
         }
     }
@@ -211,7 +211,7 @@ pub(crate) struct Placed {
     /// Whether to write over whatever is there.
     is_forced: bool,
     /// Why the image may be wrong although it is made.
-    used_anyway: Option<String>,
+    overruled_problem: Option<String>,
 }
 
 impl Placed {
@@ -222,14 +222,14 @@ impl Placed {
             image,
             json,
             is_forced,
-            used_anyway: None,
+            overruled_problem: None,
         }
     }
 
     /// The same place, whose JSON file gives the reason the image may be wrong.
-    pub(crate) fn used_anyway(self, used_anyway: Option<String>) -> Self {
+    pub(crate) fn overruled_problem(self, overruled_problem: Option<String>) -> Self {
         Self {
-            used_anyway,
+            overruled_problem,
             ..self
         }
     }

@@ -8,18 +8,18 @@ use ort::session::Session;
 
 use super::port::Port;
 use super::session::{
-    GraphSource, SessionOptions, Stopper, builder, one_line, ports, run, take_batch,
+    GraphSource, SessionOptions, Stopper, one_line, ports, remove_batch, run, session_builder,
 };
 use crate::conventions::Signature;
 use crate::conventions::preset::Preset;
 use crate::conventions::sidecar::{ADD, ModelSidecar};
-use crate::failure::{RunFailure, load_problem};
-use crate::inputs::{DarkImage, FedImage, Feeding, Tensor};
-use crate::libraries::{Ended, JobLimits, Runtime};
+use crate::failure::{RunFailure, describe_load_failure};
+use crate::inputs::{DarkImage, FedImage, InputEncoding, Tensor};
+use crate::libraries::{JobEnd, JobLimits, Runtime};
 use crate::limits::{ImageClock, MemoryLimit, TimeLimit};
-use crate::outputs::{Composition, ImageTensor, OutOfRange};
+use crate::outputs::{Composition, ImageTensor, InvalidValues};
 use crate::planes::Planes;
-use crate::probes::Codes;
+use crate::probes::UnclampedImage;
 use crate::sizing::TileWindow;
 use darkqa_ground::error::Result;
 use darkqa_ground::types::Rgb;
@@ -27,12 +27,12 @@ use darkqa_ground::types::Rgb;
 /// A loaded graph with its session.
 pub(crate) struct Graph {
     pub(crate) signature: Arc<Signature>,
-    pub(crate) feeding: Feeding,
-    pub(crate) reading: Arc<Composition>,
+    pub(crate) encoding: InputEncoding,
+    pub(crate) decoding: Arc<Composition>,
     /// Statements of sidecar and preset.
     pub(crate) convention: ModelSidecar,
     /// Differences between the graph and the model that the preset's authors published.
-    pub(crate) differing: Option<String>,
+    pub(crate) preset_differences: Option<String>,
     runtime: Runtime,
     session: Arc<Mutex<Session>>,
     options: Arc<SessionOptions>,
@@ -83,7 +83,7 @@ pub(crate) enum RunResult<T> {
     /// It gave no image of this size.
     Failed(RunFailure),
     /// The values of the output are not those of an image.
-    Unusable(OutOfRange),
+    Unusable(InvalidValues),
 }
 
 impl Graph {
@@ -100,24 +100,27 @@ impl Graph {
         limits: LoadLimits,
     ) -> Result<std::result::Result<Self, String>> {
         let environment = runtime.environment().clone();
-        let job = move || builder(&environment, threads).and_then(|found| source.commit(found));
+        let job =
+            move || session_builder(&environment, threads).and_then(|found| source.commit(found));
         let within = JobLimits {
             time: limits.time.get(),
             memory: limits.memory,
         };
         let session = match runtime.thread().run_or_leave(within, job)? {
-            Ended::InTime(session) => session,
-            Ended::Late => {
+            JobEnd::Finished(session) => session,
+            JobEnd::TimedOut => {
                 let problem = format!(
                     "takes longer than {} s to load; allow more with --llie-options timeout=SECONDS (0: no limit)",
                     limits.time
                 );
                 return Ok(Err(problem));
             }
-            Ended::TooLarge => return Ok(Err(RunFailure::TooLarge(limits.memory).words())),
+            JobEnd::MemoryExceeded => {
+                return Ok(Err(RunFailure::MemoryExceeded(limits.memory).message()));
+            }
         };
         Ok(session
-            .map_err(|e| load_problem(&one_line(&e), runtime.version()))
+            .map_err(|e| describe_load_failure(&one_line(&e), runtime.version()))
             .and_then(|session| Self::new(session, sidecar, preset, runtime))
             .map(|mut graph| {
                 graph.limit_time(limits.time);
@@ -133,7 +136,7 @@ impl Graph {
         runtime: &Runtime,
     ) -> std::result::Result<Self, String> {
         let (mut inputs, mut outputs) = (ports(session.inputs()), ports(session.outputs()));
-        let batch = take_batch(&mut inputs, &mut outputs);
+        let batch = remove_batch(&mut inputs, &mut outputs);
         let convention = match preset {
             None => sidecar.clone(),
             Some(preset) => {
@@ -141,7 +144,7 @@ impl Graph {
                 sidecar.clone().with_defaults(&preset)
             }
         };
-        let differing = preset.and_then(|preset| preset.differing(&inputs, &outputs));
+        let preset_differences = preset.and_then(|preset| preset.differences(&inputs, &outputs));
         let ports = Ports {
             inputs,
             outputs,
@@ -149,7 +152,10 @@ impl Graph {
         };
         let session = Arc::new(Mutex::new(session));
         let graph = Self::from_session(session, Arc::new(ports), convention, runtime)?;
-        Ok(Self { differing, ..graph })
+        Ok(Self {
+            preset_differences,
+            ..graph
+        })
     }
 
     fn from_session(
@@ -163,10 +169,10 @@ impl Graph {
         let releasing = SessionOptions::releasing_memory(&signature.outputs);
         let releasing = releasing.map_err(|e| one_line(&e))?;
         Ok(Self {
-            feeding: Feeding::new(&signature, &convention),
-            reading: Arc::new(Composition::new(&signature, &convention)?),
+            encoding: InputEncoding::new(&signature, &convention),
+            decoding: Arc::new(Composition::new(&signature, &convention)?),
             convention,
-            differing: None,
+            preset_differences: None,
             signature: Arc::new(signature),
             runtime: runtime.clone(),
             session,
@@ -190,7 +196,9 @@ impl Graph {
         let mut graph = Self::from_session(session, ports, convention, &self.runtime)?;
         graph.clock = Mutex::new(*self.clock());
         graph.memory = self.memory;
-        graph.differing.clone_from(&self.differing);
+        graph
+            .preset_differences
+            .clone_from(&self.preset_differences);
         Ok(graph)
     }
 
@@ -260,16 +268,16 @@ impl Graph {
     }
 
     /// Runs the model on a window of an image; returns the bytes of a part of the window.
-    pub(crate) fn window(
+    pub(crate) fn run_window(
         &self,
         dark: &DarkImage<'_>,
         window: TileWindow,
         part: TileWindow,
     ) -> Result<RunResult<Vec<u8>>> {
-        let fed = self.fed(dark, window);
+        let fed = self.fed_window(dark, window);
         let mut further = self.signature.extras.iter();
-        if let Some(problem) = further.find_map(|input| input.check_cut(&fed).err()) {
-            return Ok(RunResult::Failed(RunFailure::NotCut(problem)));
+        if let Some(problem) = further.find_map(|input| input.check_tileable(&fed).err()) {
+            return Ok(RunResult::Failed(RunFailure::CannotTile(problem)));
         }
         let used = TileWindow {
             left: window.left + part.left,
@@ -277,11 +285,11 @@ impl Graph {
             right: window.left + part.right,
             bottom: window.top + part.bottom,
         };
-        let needed = self.reading.needs_dark();
-        let dark = needed.then(|| self.fed(dark, used).planes().into_owned());
-        let (reading, size) = (Arc::clone(&self.reading), window.size());
+        let needed = self.decoding.needs_dark();
+        let dark = needed.then(|| self.fed_window(dark, used).planes().into_owned());
+        let (decoding, size) = (Arc::clone(&self.decoding), window.size());
         self.run(&self.options, &fed, move |outputs| {
-            reading.bytes(outputs, size, part, dark.as_ref())
+            decoding.bytes(outputs, size, part, dark.as_ref())
         })
     }
 
@@ -302,53 +310,57 @@ impl Graph {
             Arena::Released => &self.releasing,
         };
         let dark = DarkImage::new(image);
-        self.run(options, &self.fed(&dark, window), |_| Ok(()))
+        self.run(options, &self.fed_window(&dark, window), |_| Ok(()))
     }
 
     /// Runs the model on a whole image of floats.
-    pub(crate) fn planes(&self, planes: &Planes) -> Result<RunResult<Planes>> {
-        let (reading, size) = (Arc::clone(&self.reading), planes.size());
-        let dark = reading.needs_dark().then(|| planes.clone());
+    pub(crate) fn run_planes(&self, planes: &Planes) -> Result<RunResult<Planes>> {
+        let (decoding, size) = (Arc::clone(&self.decoding), planes.size());
+        let dark = decoding.needs_dark().then(|| planes.clone());
         self.run(&self.options, &FedImage::Whole(planes), move |outputs| {
-            reading.planes(outputs, size, TileWindow::whole(size), dark.as_ref())
+            decoding.planes(outputs, size, TileWindow::whole(size), dark.as_ref())
         })
     }
 
     /// Runs the model once on a whole image, and reads it by the conventions of several graphs, which feed it as this one does.
-    pub(crate) fn readings(&self, image: &Rgb, graphs: &[Self]) -> Result<RunResult<Vec<Codes>>> {
-        let readings: Vec<Arc<Composition>> = graphs
+    pub(crate) fn run_with_conventions(
+        &self,
+        image: &Rgb,
+        graphs: &[Self],
+    ) -> Result<RunResult<Vec<UnclampedImage>>> {
+        let decodings: Vec<Arc<Composition>> = graphs
             .iter()
-            .map(|graph| Arc::clone(&graph.reading))
+            .map(|graph| Arc::clone(&graph.decoding))
             .collect();
         let dark = Planes::from_rgb(image);
         let fed = dark.clone();
         self.run(&self.options, &FedImage::Whole(&fed), move |outputs| {
             let size = dark.size();
-            let codes = readings.iter().map(|reading| {
-                let dark = reading.needs_dark().then_some(&dark);
-                let planes = reading.planes(outputs, size, TileWindow::whole(size), dark);
+            let codes = decodings.iter().map(|decoding| {
+                let dark = decoding.needs_dark().then_some(&dark);
+                let planes = decoding.planes(outputs, size, TileWindow::whole(size), dark);
                 // The rules about plausible images name values that are none.
                 planes.map_or_else(
-                    |_| Codes::unusable(size),
-                    |planes| Codes::from_planes(&planes),
+                    |_| UnclampedImage::not_a_number(size),
+                    |planes| UnclampedImage::from_planes(&planes),
                 )
             });
             Ok(codes.collect())
         })
     }
 
-    fn fed<'a>(&self, dark: &'a DarkImage<'a>, window: TileWindow) -> FedImage<'a> {
+    fn fed_window<'a>(&self, dark: &'a DarkImage<'a>, window: TileWindow) -> FedImage<'a> {
         FedImage::Window {
             dark,
             window,
-            pad: self.feeding.pad,
+            pad: self.encoding.pad,
         }
     }
 
     /// The tensors of all inputs, by name; `None` if expressions in the sidecar give values that are not finite.
     fn inputs(&self, fed: &FedImage<'_>) -> Option<Vec<(String, Tensor)>> {
         let name = |port: &Port| port.name.clone();
-        let image = self.feeding.tensor(fed)?;
+        let image = self.encoding.tensor(fed)?;
         let mut inputs = vec![(name(&self.signature.input.port), image)];
         for extra in &self.signature.extras {
             inputs.push((name(&extra.port), extra.tensor(fed)?));
@@ -361,14 +373,14 @@ impl Graph {
         &self,
         options: &Arc<SessionOptions>,
         fed: &FedImage<'_>,
-        read: impl FnOnce(&[ImageTensor<'_>]) -> std::result::Result<T, OutOfRange> + Send + 'static,
+        read: impl FnOnce(&[ImageTensor<'_>]) -> std::result::Result<T, InvalidValues> + Send + 'static,
     ) -> Result<RunResult<T>> {
         let Some(inputs) = self.inputs(fed) else {
-            return Ok(RunResult::Unusable(OutOfRange::NotFed));
+            return Ok(RunResult::Unusable(InvalidValues::NonFiniteInput));
         };
         let size = fed.size();
         let (session, signature) = (Arc::clone(&self.session), Arc::clone(&self.signature));
-        let (reading, used) = (Arc::clone(&self.reading), Arc::clone(options));
+        let (decoding, used) = (Arc::clone(&self.decoding), Arc::clone(options));
         let (clock, batch, start) = (*self.clock(), self.ports.batch, Instant::now());
         let job = move || {
             let mut session = session.lock().unwrap_or_else(PoisonError::into_inner);
@@ -378,7 +390,7 @@ impl Graph {
                 batch,
                 inputs,
                 &signature.outputs,
-                |outputs| match reading.laid_out(outputs, size) {
+                |outputs| match decoding.assign_layouts(outputs, size) {
                     Ok(images) => read(&images).map_or_else(RunResult::Unusable, RunResult::Output),
                     Err(other) => RunResult::Failed(other.failure(size)),
                 },
@@ -387,7 +399,7 @@ impl Graph {
                 .unwrap_or_else(|e| RunResult::Failed(RunFailure::from_message(size, one_line(&e))))
         };
         let limits = JobLimits {
-            time: clock.left(),
+            time: clock.remaining(),
             memory: self.memory,
         };
         let ended = self
@@ -396,14 +408,14 @@ impl Graph {
             .run_within(limits, || options.end_run(), job)?;
         self.clock().add(start.elapsed());
         Ok(match (ended, clock.limit()) {
-            (Ended::InTime(result), _) => result,
-            (Ended::Late, limit) => {
+            (JobEnd::Finished(result), _) => result,
+            (JobEnd::TimedOut, limit) => {
                 options.allow_runs();
-                RunResult::Failed(RunFailure::TooLong(limit.unwrap_or_default()))
+                RunResult::Failed(RunFailure::TimedOut(limit.unwrap_or_default()))
             }
-            (Ended::TooLarge, _) => {
+            (JobEnd::MemoryExceeded, _) => {
                 options.allow_runs();
-                RunResult::Failed(RunFailure::TooLarge(self.memory))
+                RunResult::Failed(RunFailure::MemoryExceeded(self.memory))
             }
         })
     }

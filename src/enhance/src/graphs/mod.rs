@@ -8,6 +8,6 @@ mod session;
 pub use graph::LoadLimits;
 pub(super) use graph::{Arena, Graph, RunResult};
 pub use network::Network;
-pub(super) use port::{Dim, Port, list};
+pub(super) use port::{Dim, Port, format_ports};
 pub(super) use session::GraphSource;
 pub use session::Stopper;

@@ -8,8 +8,8 @@ use ort::value::Tensor;
 
 use darkqa_ground::error::{Error, Result};
 
-use super::session::{builder, one_line};
-use crate::failure::load_problem;
+use super::session::{one_line, session_builder};
+use crate::failure::describe_load_failure;
 use crate::libraries::Runtime;
 
 /// A loaded network with one input and several outputs, all of 32-bit floats. It runs on one thread, so that its outputs do not
@@ -27,14 +27,14 @@ impl Network {
     /// If ONNX Runtime refuses it.
     pub fn open(name: &'static str, model: &'static [u8], runtime: &Runtime) -> Result<Self> {
         // Enhancers work at the same time.
-        let runtime = runtime.beside()?;
+        let runtime = runtime.with_new_thread()?;
         let environment = runtime.environment().clone();
         let job = move || {
-            let mut builder = builder(&environment, Some(NonZeroUsize::MIN))?;
+            let mut builder = session_builder(&environment, Some(NonZeroUsize::MIN))?;
             builder.commit_from_memory(model)
         };
         let session = runtime.thread().run(job)?.map_err(|e| {
-            let problem = load_problem(&one_line(&e), runtime.version());
+            let problem = describe_load_failure(&one_line(&e), runtime.version());
             Error::Runtime(format!("{name}: {problem}"))
         })?;
         Ok(Self {

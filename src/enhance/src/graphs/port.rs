@@ -5,7 +5,7 @@ use std::fmt;
 use crate::conventions::{ElementType, TensorLayout};
 
 /// Most channels of an output; chosen, Zero-DCE's curves have 24.
-const MOST_CHANNELS: usize = 64;
+const MAX_CHANNELS: usize = 64;
 
 /// An input or output of a graph.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -70,10 +70,10 @@ impl Port {
     pub(crate) fn layout(&self, channels: usize) -> Option<TensorLayout> {
         let mut fitting = TensorLayout::ALL.into_iter().filter(|layout| {
             self.dims.len() == layout.rank()
-                && self.dims[layout.places()[0]].known() == Some(channels)
+                && self.dims[layout.axes()[0]].known() == Some(channels)
                 && (layout.rank() == 3 || self.dims[0].can_be(1))
         });
-        // With such a size in two places, the layout is ambiguous.
+        // With such a size in two axes, the layout is ambiguous.
         fitting.next().filter(|_| fitting.next().is_none())
     }
 
@@ -91,7 +91,7 @@ impl Port {
         count: usize,
         [height, width]: [&Dim; 2],
     ) -> bool {
-        let [channels, rows, columns] = layout.places();
+        let [channels, rows, columns] = layout.axes();
         let shape = self.dims.is_empty()
             || self.dims.len() == layout.rank()
                 && self.dims[channels].can_be(count)
@@ -99,7 +99,7 @@ impl Port {
                 && self.dims[columns].can_equal(width)
                 && !self.has_channels_as_side([rows, columns], [height, width])
                 && (layout.rank() == 3 || self.dims[0].can_be(1));
-        shape && self.element.is_read()
+        shape && self.element.is_output_type()
     }
 
     /// Whether one of two sides is a small number while the other, and those of the input, are free: a number of channels, not of
@@ -107,7 +107,7 @@ impl Port {
     fn has_channels_as_side(&self, sides: [usize; 2], input: [&Dim; 2]) -> bool {
         let [one, other] = sides.map(|side| self.dims[side].known());
         let is_free = input.iter().all(|side| side.known().is_none());
-        let small = |side: Option<usize>| side.is_some_and(|size| size <= MOST_CHANNELS);
+        let small = |side: Option<usize>| side.is_some_and(|size| size <= MAX_CHANNELS);
         is_free && (small(one) && other.is_none() || small(other) && one.is_none())
     }
 
@@ -116,8 +116,8 @@ impl Port {
         TensorLayout::ALL
             .into_iter()
             .filter(|layout| layout.rank() == self.dims.len())
-            .filter_map(|layout| self.dims[layout.places()[0]].known())
-            .filter(|count| *count <= MOST_CHANNELS)
+            .filter_map(|layout| self.dims[layout.axes()[0]].known())
+            .filter(|count| *count <= MAX_CHANNELS)
             .collect()
     }
 
@@ -152,7 +152,7 @@ impl Port {
 }
 
 /// The ports as text, for messages.
-pub(crate) fn list(ports: &[Port]) -> String {
+pub(crate) fn format_ports(ports: &[Port]) -> String {
     if ports.is_empty() {
         return "none".to_owned();
     }

@@ -99,7 +99,7 @@ pub(super) fn run<T>(
 ) -> ort::Result<T> {
     let inputs = inputs
         .into_iter()
-        .map(|(name, input)| Ok((name, SessionInputValue::from(tensor(input, batch)?))))
+        .map(|(name, input)| Ok((name, SessionInputValue::from(to_ort_tensor(input, batch)?))))
         .collect::<ort::Result<Vec<_>>>()?;
     let results = session.run_with_options(inputs, &options.options)?;
     let tensors = outputs
@@ -121,32 +121,32 @@ fn output_tensor<'a>(
     let (dims, samples) = match element {
         ElementType::Uint8 => {
             let (dims, samples) = value.try_extract_tensor::<u8>()?;
-            let (dims, samples) = first_of(batch, dims, samples);
+            let (dims, samples) = first_image(batch, dims, samples);
             (dims, TensorSamples::Uint8(samples))
         }
         ElementType::Float16 => {
             let (dims, samples) = value.try_extract_tensor::<half::f16>()?;
-            let (dims, samples) = first_of(batch, dims, samples);
+            let (dims, samples) = first_image(batch, dims, samples);
             (dims, TensorSamples::Float16(samples))
         }
         ElementType::Float64 => {
             let (dims, samples) = value.try_extract_tensor::<f64>()?;
-            let (dims, samples) = first_of(batch, dims, samples);
+            let (dims, samples) = first_image(batch, dims, samples);
             (dims, TensorSamples::Float64(samples))
         }
         ElementType::Int32 => {
             let (dims, samples) = value.try_extract_tensor::<i32>()?;
-            let (dims, samples) = first_of(batch, dims, samples);
+            let (dims, samples) = first_image(batch, dims, samples);
             (dims, TensorSamples::Int32(samples))
         }
         ElementType::Int64 => {
             let (dims, samples) = value.try_extract_tensor::<i64>()?;
-            let (dims, samples) = first_of(batch, dims, samples);
+            let (dims, samples) = first_image(batch, dims, samples);
             (dims, TensorSamples::Int64(samples))
         }
         _ => {
             let (dims, samples) = value.try_extract_tensor::<f32>()?;
-            let (dims, samples) = first_of(batch, dims, samples);
+            let (dims, samples) = first_image(batch, dims, samples);
             (dims, TensorSamples::Float32(samples))
         }
     };
@@ -154,7 +154,7 @@ fn output_tensor<'a>(
 }
 
 /// Dimensions and samples of the first image of a batch.
-fn first_of<'a, T>(batch: usize, dims: &[i64], samples: &'a [T]) -> (Vec<i64>, &'a [T]) {
+fn first_image<'a, T>(batch: usize, dims: &[i64], samples: &'a [T]) -> (Vec<i64>, &'a [T]) {
     let mut dims = dims.to_vec();
     match dims.first_mut() {
         Some(first) if batch > 1 && usize::try_from(*first) == Ok(batch) => {
@@ -165,8 +165,8 @@ fn first_of<'a, T>(batch: usize, dims: &[i64], samples: &'a [T]) -> (Vec<i64>, &
     }
 }
 
-/// A tensor; an image is repeated along the dimension of the batch, which is 1.
-fn tensor(input: InputTensor, batch: usize) -> ort::Result<DynValue> {
+/// A tensor; an image is repeat along the dimension of the batch, which is 1.
+fn to_ort_tensor(input: InputTensor, batch: usize) -> ort::Result<DynValue> {
     let InputTensor { mut dims, data } = input;
     let times = match dims.as_mut_slice() {
         [first @ 1, _, _, _] => {
@@ -176,45 +176,31 @@ fn tensor(input: InputTensor, batch: usize) -> ort::Result<DynValue> {
         _ => 1,
     };
     Ok(match data {
-        TensorData::Bool(values) => Tensor::from_array((dims, repeated(values, times)))?.into_dyn(),
-        TensorData::Int8(values) => Tensor::from_array((dims, repeated(values, times)))?.into_dyn(),
-        TensorData::Int16(values) => {
-            Tensor::from_array((dims, repeated(values, times)))?.into_dyn()
-        }
-        TensorData::Int32(values) => {
-            Tensor::from_array((dims, repeated(values, times)))?.into_dyn()
-        }
-        TensorData::Int64(values) => {
-            Tensor::from_array((dims, repeated(values, times)))?.into_dyn()
-        }
-        TensorData::Uint8(values) => {
-            Tensor::from_array((dims, repeated(values, times)))?.into_dyn()
-        }
-        TensorData::Uint16(values) => {
-            Tensor::from_array((dims, repeated(values, times)))?.into_dyn()
-        }
-        TensorData::Uint32(values) => {
-            Tensor::from_array((dims, repeated(values, times)))?.into_dyn()
-        }
-        TensorData::Uint64(values) => {
-            Tensor::from_array((dims, repeated(values, times)))?.into_dyn()
-        }
+        TensorData::Bool(values) => Tensor::from_array((dims, repeat(values, times)))?.into_dyn(),
+        TensorData::Int8(values) => Tensor::from_array((dims, repeat(values, times)))?.into_dyn(),
+        TensorData::Int16(values) => Tensor::from_array((dims, repeat(values, times)))?.into_dyn(),
+        TensorData::Int32(values) => Tensor::from_array((dims, repeat(values, times)))?.into_dyn(),
+        TensorData::Int64(values) => Tensor::from_array((dims, repeat(values, times)))?.into_dyn(),
+        TensorData::Uint8(values) => Tensor::from_array((dims, repeat(values, times)))?.into_dyn(),
+        TensorData::Uint16(values) => Tensor::from_array((dims, repeat(values, times)))?.into_dyn(),
+        TensorData::Uint32(values) => Tensor::from_array((dims, repeat(values, times)))?.into_dyn(),
+        TensorData::Uint64(values) => Tensor::from_array((dims, repeat(values, times)))?.into_dyn(),
         TensorData::Float16(values) => {
-            Tensor::from_array((dims, repeated(values, times)))?.into_dyn()
+            Tensor::from_array((dims, repeat(values, times)))?.into_dyn()
         }
         TensorData::Bfloat16(values) => {
-            Tensor::from_array((dims, repeated(values, times)))?.into_dyn()
+            Tensor::from_array((dims, repeat(values, times)))?.into_dyn()
         }
         TensorData::Float32(values) => {
-            Tensor::from_array((dims, repeated(values, times)))?.into_dyn()
+            Tensor::from_array((dims, repeat(values, times)))?.into_dyn()
         }
         TensorData::Float64(values) => {
-            Tensor::from_array((dims, repeated(values, times)))?.into_dyn()
+            Tensor::from_array((dims, repeat(values, times)))?.into_dyn()
         }
     })
 }
 
-fn repeated<T: Copy>(values: Vec<T>, times: usize) -> Vec<T> {
+fn repeat<T: Copy>(values: Vec<T>, times: usize) -> Vec<T> {
     if times == 1 {
         values
     } else {
@@ -238,7 +224,7 @@ impl GraphSource {
 }
 
 /// Builder of a session with this program's options. `threads` is the number of threads, by default that of the cores.
-pub(super) fn builder(
+pub(super) fn session_builder(
     environment: &Environment,
     threads: Option<NonZeroUsize>,
 ) -> ort::Result<SessionBuilder> {
@@ -255,13 +241,13 @@ pub(super) fn builder(
     Ok(builder)
 }
 
-/// Largest batch of a graph for which an image is repeated; chosen, exports of a few images exist.
-const MOST_BATCH: usize = 64;
+/// Largest batch of a graph for which an image is repeat; chosen, exports of a few images exist.
+const MAX_BATCH: usize = 64;
 
 /// Images that each run takes, if the graph fixes a number above 1, and then makes the ports those of one image.
-pub(super) fn take_batch(inputs: &mut [Port], outputs: &mut [Port]) -> usize {
+pub(super) fn remove_batch(inputs: &mut [Port], outputs: &mut [Port]) -> usize {
     let fixed = |port: &Port| match port.dims.as_slice() {
-        [Dim::Known(batch @ 2..=MOST_BATCH), _, _, _] => Some(*batch),
+        [Dim::Known(batch @ 2..=MAX_BATCH), _, _, _] => Some(*batch),
         _ => None,
     };
     let Some(batch) = inputs.iter().find_map(fixed) else {

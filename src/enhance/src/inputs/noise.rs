@@ -1,4 +1,4 @@
-//! Noise that a model takes as an input: [`normal`].
+//! Noise that a model takes as an input: [`normal_noise`].
 
 use super::fed_image::FedImage;
 use crate::conventions::NoiseStatement;
@@ -9,7 +9,7 @@ use darkqa_light::{Component, NoiseKey, Site};
 ///
 /// Each number is a function of the seed, the whole dark image, the input's name, and its channel, row and column in the field
 /// of the whole image. So threads change nothing, and a tile gets its part of that field.
-pub(super) fn normal(
+pub(super) fn normal_noise(
     statement: &NoiseStatement,
     name: &str,
     channels: usize,
@@ -53,7 +53,7 @@ mod tests {
             window,
             pad: Padding::Reflect,
         };
-        normal(statement, name, 2, &fed)
+        normal_noise(statement, name, 2, &fed)
     }
 
     fn window(left: usize, right: usize) -> TileWindow {

@@ -37,7 +37,7 @@ impl TensorData {
     ///
     /// # Errors
     /// If the number does not fit; the message names the number and the type.
-    pub(super) fn filled(
+    pub(super) fn repeated(
         element: &ElementType,
         number: Number,
         count: usize,
@@ -47,15 +47,15 @@ impl TensorData {
                 Number::Bool(value) => Some(Self::Bool(vec![value; count])),
                 _ => None,
             },
-            ElementType::Int8 => whole(number, count).map(Self::Int8),
-            ElementType::Int16 => whole(number, count).map(Self::Int16),
-            ElementType::Int32 => whole(number, count).map(Self::Int32),
-            ElementType::Int64 => whole(number, count).map(Self::Int64),
-            ElementType::Uint8 => whole(number, count).map(Self::Uint8),
-            ElementType::Uint16 => whole(number, count).map(Self::Uint16),
-            ElementType::Uint32 => whole(number, count).map(Self::Uint32),
-            ElementType::Uint64 => whole(number, count).map(Self::Uint64),
-            _ => float(element, number).map(|value| match element {
+            ElementType::Int8 => repeat_integer(number, count).map(Self::Int8),
+            ElementType::Int16 => repeat_integer(number, count).map(Self::Int16),
+            ElementType::Int32 => repeat_integer(number, count).map(Self::Int32),
+            ElementType::Int64 => repeat_integer(number, count).map(Self::Int64),
+            ElementType::Uint8 => repeat_integer(number, count).map(Self::Uint8),
+            ElementType::Uint16 => repeat_integer(number, count).map(Self::Uint16),
+            ElementType::Uint32 => repeat_integer(number, count).map(Self::Uint32),
+            ElementType::Uint64 => repeat_integer(number, count).map(Self::Uint64),
+            _ => exact_float(element, number).map(|value| match element {
                 ElementType::Float16 => Self::Float16(vec![f16::from_f64(value); count]),
                 ElementType::Bfloat16 => Self::Bfloat16(vec![bf16::from_f64(value); count]),
                 ElementType::Float64 => Self::Float64(vec![value; count]),
@@ -65,17 +65,17 @@ impl TensorData {
         fitting.ok_or_else(|| format!("{number} does not fit its type {element}"))
     }
 
-    /// These numbers, one after another; each must fit as in [`TensorData::filled`].
+    /// These numbers, one after another; each must fit as in [`TensorData::repeated`].
     ///
     /// # Errors
     /// If a number does not fit; the message names the number and the type.
-    pub(super) fn listed(element: &ElementType, numbers: &[Number]) -> Result<Self, String> {
-        let mut all = Self::filled(element, Number::Integer(0), 0).or_else(|_| {
+    pub(super) fn from_numbers(element: &ElementType, numbers: &[Number]) -> Result<Self, String> {
+        let mut all = Self::repeated(element, Number::Integer(0), 0).or_else(|_| {
             // A truth value has no 0.
-            Self::filled(element, Number::Bool(false), 0)
+            Self::repeated(element, Number::Bool(false), 0)
         })?;
         for number in numbers {
-            match (&mut all, Self::filled(element, *number, 1)?) {
+            match (&mut all, Self::repeated(element, *number, 1)?) {
                 (Self::Bool(all), Self::Bool(one)) => all.extend(one),
                 (Self::Int8(all), Self::Int8(one)) => all.extend(one),
                 (Self::Int16(all), Self::Int16(one)) => all.extend(one),
@@ -97,7 +97,7 @@ impl TensorData {
     }
 
     /// Floats as elements of a float type; `None` for another type.
-    pub(super) fn floats(element: &ElementType, values: Vec<f32>) -> Option<Self> {
+    pub(super) fn from_floats(element: &ElementType, values: Vec<f32>) -> Option<Self> {
         Some(match element {
             ElementType::Float16 => Self::Float16(values.into_iter().map(f16::from_f32).collect()),
             ElementType::Bfloat16 => {
@@ -111,7 +111,7 @@ impl TensorData {
 }
 
 /// Converts a whole number to an integer type and repeats it `count` times.
-fn whole<T: Copy + TryFrom<i128>>(number: Number, count: usize) -> Option<Vec<T>> {
+fn repeat_integer<T: Copy + TryFrom<i128>>(number: Number, count: usize) -> Option<Vec<T>> {
     let whole = match number {
         Number::Integer(value) => i128::from(value),
         // 2^64 is beyond every type, and all floats below are exact.
@@ -123,8 +123,8 @@ fn whole<T: Copy + TryFrom<i128>>(number: Number, count: usize) -> Option<Vec<T>
     T::try_from(whole).ok().map(|value| vec![value; count])
 }
 
-/// A number as a float that the type can hold, see [`TensorData::filled`].
-fn float(element: &ElementType, number: Number) -> Option<f64> {
+/// A number as a float that the type can hold, see [`TensorData::repeated`].
+fn exact_float(element: &ElementType, number: Number) -> Option<f64> {
     let rounded = |value: f64| match element {
         ElementType::Float16 => Some(f16::from_f64(value).to_f64()),
         ElementType::Bfloat16 => Some(bf16::from_f64(value).to_f64()),
@@ -150,7 +150,7 @@ mod tests {
     use super::*;
 
     fn one(element: &ElementType, number: Number) -> Result<TensorData, String> {
-        TensorData::filled(element, number, 1)
+        TensorData::repeated(element, number, 1)
     }
 
     #[test]

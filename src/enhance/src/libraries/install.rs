@@ -69,7 +69,7 @@ impl Pin {
     }
 
     /// Whether a file has the name of the library that is installed.
-    pub(super) fn is_for(self, path: &Path) -> bool {
+    pub(super) fn matches_name(self, path: &Path) -> bool {
         path.file_name().is_some_and(|name| name == self.file)
     }
 

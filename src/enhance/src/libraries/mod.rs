@@ -10,4 +10,4 @@ mod search;
 
 pub(super) use library::PINNED;
 pub use runtime::{Install, Runtime, RuntimeSearch, disable_telemetry};
-pub(super) use runtime_thread::{Ended, JobLimits};
+pub(super) use runtime_thread::{JobEnd, JobLimits};

@@ -17,7 +17,7 @@ use darkqa_ground::error::{Error, Result};
 use super::install::{Pin, check_installed, install};
 use super::library::{OLDEST, PINNED, probe};
 use super::runtime_thread::RuntimeThread;
-use super::search::{LibraryPlace, Surroundings};
+use super::search::{LibraryPlace, SearchFolders};
 
 /// Whether the library may be installed if it is not found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -94,7 +94,7 @@ impl RuntimeSearch {
                     place,
                 }
             }
-            None => find(&Surroundings::from_this_process(), self.install)?,
+            None => find(&SearchFolders::from_this_process(), self.install)?,
         };
         let runtime = Runtime::start(found)?;
         Ok(open.insert(runtime).clone())
@@ -129,9 +129,9 @@ struct FoundLibrary {
 }
 
 /// Returns the first usable library of the candidates; otherwise installs one if allowed.
-fn find(surroundings: &Surroundings, policy: Install) -> Result<FoundLibrary> {
+fn find(folders: &SearchFolders, policy: Install) -> Result<FoundLibrary> {
     let mut rejected = Vec::new();
-    for (place, path) in surroundings.candidates() {
+    for (place, path) in folders.candidates() {
         match check(place, &path) {
             Ok(version) => {
                 let place = place.to_string();
@@ -144,7 +144,7 @@ fn find(surroundings: &Surroundings, policy: Install) -> Result<FoundLibrary> {
             Err(problem) if place == LibraryPlace::Cache && policy == Install::Allowed => {
                 rejected.push(format!("{} {problem}", path.display()));
                 // Reinstall a broken library in the cache: a later candidate may have another version.
-                match install_into_cache(surroundings, &rejected) {
+                match install_into_cache(folders, &rejected) {
                     Ok(found) => return Ok(found),
                     Err(problem) => tracing::warn!("ONNX Runtime cannot be reinstalled: {problem}"),
                 }
@@ -155,18 +155,13 @@ fn find(surroundings: &Surroundings, policy: Install) -> Result<FoundLibrary> {
             }
         }
     }
-    rejected.extend(
-        surroundings
-            .packages_without_library()
-            .iter()
-            .map(|folder| {
-                let folder = folder.display();
-                format!("{folder} has no library; packages since version 1.19 have one")
-            }),
-    );
+    rejected.extend(folders.packages_without_library().iter().map(|folder| {
+        let folder = folder.display();
+        format!("{folder} has no library; packages since version 1.19 have one")
+    }));
     let installed = match policy {
         Install::Offline => Err("--llie-options offline forbids installing it".to_owned()),
-        Install::Allowed => install_into_cache(surroundings, &rejected),
+        Install::Allowed => install_into_cache(folders, &rejected),
     };
     installed.map_err(|problem| Error::Runtime(not_found_message(&problem, &rejected)))
 }
@@ -175,7 +170,7 @@ fn find(surroundings: &Surroundings, policy: Install) -> Result<FoundLibrary> {
 fn check(place: LibraryPlace, path: &Path) -> Result<String, String> {
     if place == LibraryPlace::Cache
         && let Some(pin) = Pin::for_this_platform()
-        && pin.is_for(path)
+        && pin.matches_name(path)
     {
         check_installed(path, pin)?;
     }
@@ -184,7 +179,7 @@ fn check(place: LibraryPlace, path: &Path) -> Result<String, String> {
 
 /// Installs the pinned library into the cache.
 fn install_into_cache(
-    surroundings: &Surroundings,
+    folders: &SearchFolders,
     rejected: &[String],
 ) -> Result<FoundLibrary, String> {
     let pin = Pin::for_this_platform().ok_or_else(|| {
@@ -194,7 +189,7 @@ fn install_into_cache(
             std::env::consts::ARCH
         )
     })?;
-    let folder = surroundings.installed().ok_or_else(|| {
+    let folder = folders.cached_library_folder().ok_or_else(|| {
         let variables = match std::env::consts::OS {
             "windows" => "LOCALAPPDATA is not set",
             "macos" => "HOME is not set",
@@ -283,7 +278,7 @@ impl Runtime {
     ///
     /// The first thread starts the second one, which on Linux then inherits the CPU setting that treats subnormal numbers as zero. On
     /// other systems, subnormal numbers may slow the second thread down, but its results have the same bytes.
-    pub(crate) fn beside(&self) -> Result<Self> {
+    pub(crate) fn with_new_thread(&self) -> Result<Self> {
         let thread = self.0.thread.run(RuntimeThread::start)?;
         let thread = thread.map_err(|e| Error::Runtime(e.to_string()))?;
         Ok(Self(Arc::new(OpenRuntime {
@@ -330,13 +325,11 @@ mod tests {
     fn missing_library_message_lists_remedies() {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("libonnxruntime.so"), "text").unwrap();
-        let surroundings = Surroundings {
+        let folders = SearchFolders {
             system: vec![folder.path().to_owned()],
-            ..Surroundings::default()
+            ..SearchFolders::default()
         };
-        let message = find(&surroundings, Install::Offline)
-            .unwrap_err()
-            .to_string();
+        let message = find(&folders, Install::Offline).unwrap_err().to_string();
         for part in [
             "--llie-options offline",
             "--llie-options ort-lib",
@@ -351,7 +344,7 @@ mod tests {
 
     #[test]
     fn missing_cache_folder_is_an_error() {
-        let error = find(&Surroundings::default(), Install::Allowed).unwrap_err();
+        let error = find(&SearchFolders::default(), Install::Allowed).unwrap_err();
         let message = error.to_string();
         assert!(message.contains("no cache folder"), "{message}");
     }

@@ -22,12 +22,12 @@ type Job = Box<dyn FnOnce() + Send>;
 
 /// End of a job with a time limit.
 #[derive(Debug, PartialEq, Eq)]
-pub(crate) enum Ended<T> {
-    InTime(T),
+pub(crate) enum JobEnd<T> {
+    Finished(T),
     /// It took longer, and ended when it was told to.
-    Late,
+    TimedOut,
     /// It took more memory, and ended when it was told to.
-    TooLarge,
+    MemoryExceeded,
 }
 
 /// Limits of a job.
@@ -50,7 +50,7 @@ const GRACE: Duration = Duration::from_secs(10);
 
 /// Time between two looks at whether the thread is stuck in the job of another caller, and longest step in which a limit of time is counted;
 /// chosen.
-const LOOK: Duration = Duration::from_millis(500);
+const POLL_INTERVAL: Duration = Duration::from_millis(500);
 
 impl RuntimeThread {
     /// Starts the thread; it ends when this is dropped and all jobs are done.
@@ -71,8 +71,8 @@ impl RuntimeThread {
         job: impl FnOnce() -> T + Send + 'static,
     ) -> Result<T> {
         match self.run_within(JobLimits::default(), || {}, job)? {
-            Ended::InTime(result) => Ok(result),
-            Ended::Late | Ended::TooLarge => Err(thread_ended()),
+            JobEnd::Finished(result) => Ok(result),
+            JobEnd::TimedOut | JobEnd::MemoryExceeded => Err(thread_ended()),
         }
     }
 
@@ -86,15 +86,18 @@ impl RuntimeThread {
         limits: JobLimits,
         stop: impl FnOnce(),
         job: impl FnOnce() -> T + Send + 'static,
-    ) -> Result<Ended<T>> {
+    ) -> Result<JobEnd<T>> {
         let events = self.start_job(job)?;
         let (ended, patience) = match wait_for_end(&events, limits)? {
-            Ended::Late => {
+            JobEnd::TimedOut => {
                 let time = limits.time.unwrap_or_default();
-                (Ended::Late, time.saturating_mul(PATIENCE - 1).max(LOOK))
+                (
+                    JobEnd::TimedOut,
+                    time.saturating_mul(PATIENCE - 1).max(POLL_INTERVAL),
+                )
             }
-            Ended::TooLarge => (Ended::TooLarge, GRACE),
-            in_time @ Ended::InTime(_) => return Ok(in_time),
+            JobEnd::MemoryExceeded => (JobEnd::MemoryExceeded, GRACE),
+            finished @ JobEnd::Finished(_) => return Ok(finished),
         };
         stop();
         match events.recv_timeout(patience) {
@@ -103,7 +106,7 @@ impl RuntimeThread {
             Err(RecvTimeoutError::Timeout) => {
                 self.stuck.store(true, Ordering::SeqCst);
                 Err(match ended {
-                    Ended::TooLarge => Error::Runtime(format!(
+                    JobEnd::MemoryExceeded => Error::Runtime(format!(
                         "an enhancer exceeded --llie-options max-memory and could not be stopped within {} s; no more images are enhanced, finished trials are saved. Set a higher limit, or use a smaller model",
                         GRACE.as_secs()
                     )),
@@ -119,10 +122,10 @@ impl RuntimeThread {
         &self,
         limits: JobLimits,
         job: impl FnOnce() -> T + Send + 'static,
-    ) -> Result<Ended<T>> {
+    ) -> Result<JobEnd<T>> {
         let events = self.start_job(job)?;
         let ended = wait_for_end(&events, limits)?;
-        if !matches!(ended, Ended::InTime(_)) {
+        if !matches!(ended, JobEnd::Finished(_)) {
             self.stuck.store(true, Ordering::SeqCst);
         }
         Ok(ended)
@@ -150,7 +153,7 @@ impl RuntimeThread {
     /// Waits until a job starts, which earlier jobs may delay.
     fn wait_for_start<T>(&self, events: &Receiver<Event<T>>) -> Result<()> {
         loop {
-            match events.recv_timeout(LOOK) {
+            match events.recv_timeout(POLL_INTERVAL) {
                 Ok(_) => return Ok(()),
                 Err(RecvTimeoutError::Disconnected) => return Err(thread_ended()),
                 Err(RecvTimeoutError::Timeout) if self.stuck.load(Ordering::SeqCst) => {
@@ -163,27 +166,30 @@ impl RuntimeThread {
 }
 
 /// Waits until a job ends or takes more than its limits. A pause of the process (Ctrl-Z, `scontrol suspend`) counts as one step of the time.
-fn wait_for_end<T>(events: &Receiver<Event<T>>, limits: JobLimits) -> Result<Ended<T>> {
+fn wait_for_end<T>(events: &Receiver<Event<T>>, limits: JobLimits) -> Result<JobEnd<T>> {
     let mut left = limits.time;
     loop {
-        let step = left.map(|left| left.min(LOOK));
-        let step = [step, limits.memory.look()].into_iter().flatten().min();
+        let step = left.map(|left| left.min(POLL_INTERVAL));
+        let step = [step, limits.memory.poll_interval()]
+            .into_iter()
+            .flatten()
+            .min();
         let start = Instant::now();
         let event = match step {
             None => events.recv().map_err(|_| RecvTimeoutError::Disconnected),
             Some(step) => events.recv_timeout(step),
         };
         match event {
-            Ok(Event::Ended(result)) => return Ok(Ended::InTime(result)),
+            Ok(Event::Ended(result)) => return Ok(JobEnd::Finished(result)),
             Ok(Event::Started) | Err(RecvTimeoutError::Disconnected) => return Err(thread_ended()),
             Err(RecvTimeoutError::Timeout) => {}
         }
         left = left.map(|left| left.saturating_sub(running_time(start.elapsed(), step)));
         if left.is_some_and(|left| left.is_zero()) {
-            return Ok(Ended::Late);
+            return Ok(JobEnd::TimedOut);
         }
         if limits.memory.is_exceeded() {
-            return Ok(Ended::TooLarge);
+            return Ok(JobEnd::MemoryExceeded);
         }
     }
 }
@@ -233,10 +239,10 @@ mod tests {
             || told.store(true, Ordering::SeqCst),
             move || while !seen.load(Ordering::SeqCst) {},
         );
-        assert_eq!(ended.unwrap(), Ended::TooLarge);
+        assert_eq!(ended.unwrap(), JobEnd::MemoryExceeded);
         let slow = || std::thread::sleep(Duration::from_millis(250));
         let small = thread.run_within(limits("1000000"), || {}, slow);
-        assert_eq!(small.unwrap(), Ended::InTime(()));
+        assert_eq!(small.unwrap(), JobEnd::Finished(()));
     }
 
     #[test]
@@ -251,11 +257,11 @@ mod tests {
     fn a_job_that_nothing_can_end_is_left_alone() {
         let thread = RuntimeThread::start().unwrap();
         let quick = thread.run_or_leave(within(Duration::from_mins(1)), || 7);
-        assert_eq!(quick.unwrap(), Ended::InTime(7));
+        assert_eq!(quick.unwrap(), JobEnd::Finished(7));
         let slow = || std::thread::sleep(Duration::from_secs(2));
         let start = Instant::now();
         let left = thread.run_or_leave(within(Duration::from_millis(20)), slow);
-        assert_eq!(left.unwrap(), Ended::Late);
+        assert_eq!(left.unwrap(), JobEnd::TimedOut);
         assert!(start.elapsed() < Duration::from_secs(2));
         let message = thread.run(|| 8).unwrap_err().to_string();
         assert!(message.contains("--llie-options timeout"), "{message}");
@@ -272,9 +278,9 @@ mod tests {
             || told.store(true, Ordering::SeqCst),
             move || while !seen.load(Ordering::SeqCst) {},
         );
-        assert_eq!(ended.unwrap(), Ended::Late);
+        assert_eq!(ended.unwrap(), JobEnd::TimedOut);
         let quick = thread.run_within(within(Duration::from_mins(1)), || {}, || 7);
-        assert_eq!(quick.unwrap(), Ended::InTime(7));
+        assert_eq!(quick.unwrap(), JobEnd::Finished(7));
         assert_eq!(thread.run(|| 8).unwrap(), 8);
     }
 

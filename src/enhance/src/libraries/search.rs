@@ -1,4 +1,4 @@
-//! Search for ONNX Runtime's library on this machine: [`Surroundings::candidates`].
+//! Search for ONNX Runtime's library on this machine: [`SearchFolders::candidates`].
 
 use std::cmp::Reverse;
 use std::collections::HashSet;
@@ -10,7 +10,7 @@ use super::library::{PINNED, is_library_name};
 
 /// Folders and variables of the process that decide where a library is searched.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Surroundings {
+pub(super) struct SearchFolders {
     /// Folder of the running program, without links: a link to the program may stand anywhere, its environment is where the
     /// program itself is.
     pub(super) program: Option<PathBuf>,
@@ -65,8 +65,8 @@ impl fmt::Display for LibraryPlace {
     }
 }
 
-impl Surroundings {
-    /// The surroundings of this process.
+impl SearchFolders {
+    /// The folders of this process.
     pub(super) fn from_this_process() -> Self {
         let folder = |name| {
             env::var_os(name)
@@ -104,7 +104,7 @@ impl Surroundings {
     }
 
     /// Folder of the cache for a library of the pinned version; `None` if there is no cache folder.
-    pub(super) fn installed(&self) -> Option<PathBuf> {
+    pub(super) fn cached_library_folder(&self) -> Option<PathBuf> {
         let cache = self.cache.as_ref()?;
         Some(cache.join("darkqa-eval").join("onnxruntime").join(PINNED))
     }
@@ -145,10 +145,11 @@ impl Surroundings {
     fn folders(&self, place: LibraryPlace) -> Vec<PathBuf> {
         match place {
             LibraryPlace::Program => self.program.iter().cloned().collect(),
-            LibraryPlace::Environment => {
-                self.program.as_deref().map_or_else(Vec::new, own_packages)
-            }
-            LibraryPlace::Cache => self.installed().into_iter().collect(),
+            LibraryPlace::Environment => self
+                .program
+                .as_deref()
+                .map_or_else(Vec::new, packages_of_program),
+            LibraryPlace::Cache => self.cached_library_folder().into_iter().collect(),
             LibraryPlace::Python => self.python_packages(),
             LibraryPlace::System => self.system.clone(),
         }
@@ -182,7 +183,7 @@ impl Surroundings {
 /// The `onnxruntime/capi` folders of the environment that the program is installed in: `P/bin/darkqa-eval` has its packages in
 /// `P/lib/python3.12/site-packages` (on Windows `P\Scripts` and `P\Lib\site-packages`), and beside `bin` after
 /// `pip install --target`. So an environment need not be active.
-fn own_packages(program: &Path) -> Vec<PathBuf> {
+fn packages_of_program(program: &Path) -> Vec<PathBuf> {
     let Some(prefix) = program.parent() else {
         return Vec::new();
     };
@@ -274,8 +275,8 @@ mod tests {
         std::fs::write(path, "").unwrap();
     }
 
-    fn paths(surroundings: &Surroundings) -> Vec<PathBuf> {
-        surroundings
+    fn paths(folders: &SearchFolders) -> Vec<PathBuf> {
+        folders
             .candidates()
             .into_iter()
             .map(|(_, path)| path)
@@ -307,7 +308,7 @@ mod tests {
         }
         touch(&at("system/libonnxruntime_providers_shared.so"));
         touch(&at("usr/bin/python3"));
-        let surroundings = Surroundings {
+        let folders = SearchFolders {
             program: Some(at("env/bin")),
             cache: Some(at("cache")),
             virtual_env: Some(at("venv")),
@@ -315,7 +316,7 @@ mod tests {
             home: Some(at("home")),
             system: vec![at("system")],
         };
-        assert_eq!(paths(&surroundings), expected);
+        assert_eq!(paths(&folders), expected);
     }
 
     #[test]
@@ -334,11 +335,11 @@ mod tests {
             root.join("venv/bin/python"),
         )
         .unwrap();
-        let surroundings = Surroundings {
+        let folders = SearchFolders {
             path: vec![root.join("venv/bin")],
-            ..Surroundings::default()
+            ..SearchFolders::default()
         };
-        assert_eq!(paths(&surroundings), expected);
+        assert_eq!(paths(&folders), expected);
     }
 
     #[test]
@@ -348,16 +349,16 @@ mod tests {
             .path()
             .join("lib/python3.12/site-packages/onnxruntime/capi");
         touch(&capi.join("onnxruntime_pybind11_state.so"));
-        let surroundings = Surroundings {
+        let folders = SearchFolders {
             program: Some(root.path().join("bin")),
-            ..Surroundings::default()
+            ..SearchFolders::default()
         };
         assert_eq!(
-            surroundings.packages_without_library(),
+            folders.packages_without_library(),
             std::slice::from_ref(&capi)
         );
         touch(&capi.join("libonnxruntime.so.1.19.0"));
-        assert!(surroundings.packages_without_library().is_empty());
+        assert!(folders.packages_without_library().is_empty());
     }
 
     #[test]
@@ -366,10 +367,10 @@ mod tests {
         let library = root.path().join("libonnxruntime.so.1.31.1");
         touch(&library);
         std::os::unix::fs::symlink(&library, root.path().join("libonnxruntime.so.1")).unwrap();
-        let surroundings = Surroundings {
+        let folders = SearchFolders {
             system: vec![root.path().to_owned()],
-            ..Surroundings::default()
+            ..SearchFolders::default()
         };
-        assert_eq!(paths(&surroundings), [library]);
+        assert_eq!(paths(&folders), [library]);
     }
 }

@@ -41,11 +41,11 @@ const LAYOUTS: [Layout; 2] = [
 /// Bytes that this process may still use by the limits of its control groups; `None` if none has a limit.
 pub(super) fn unused_memory() -> Option<u64> {
     let own = fs::read_to_string("/proc/self/cgroup").unwrap_or_default();
-    unused(&own, Path::new("/sys/fs/cgroup"))
+    unused_by_groups(&own, Path::new("/sys/fs/cgroup"))
 }
 
 /// The same for a process with this `/proc/self/cgroup`, where the groups are mounted at `mount`.
-fn unused(own: &str, mount: &Path) -> Option<u64> {
+fn unused_by_groups(own: &str, mount: &Path) -> Option<u64> {
     let of_layout = |layout: &Layout| {
         let folder = mount.join(layout.folder);
         // A container may not see the names of the groups above it: its own is mounted as the topmost.
@@ -56,7 +56,7 @@ fn unused(own: &str, mount: &Path) -> Option<u64> {
         group
             .ancestors()
             .take_while(|at| at.starts_with(&folder))
-            .filter_map(|at| rest(at, layout))
+            .filter_map(|at| unused_in_group(at, layout))
             .min()
     };
     LAYOUTS.iter().filter_map(of_layout).min()
@@ -75,7 +75,7 @@ fn own_group<'a>(own: &'a str, controller: &str) -> Option<&'a str> {
 }
 
 /// The bytes that a group may still use; `None` without a limit.
-fn rest(group: &Path, layout: &Layout) -> Option<u64> {
+fn unused_in_group(group: &Path, layout: &Layout) -> Option<u64> {
     let number = |file: &str| -> Option<u64> {
         let text = fs::read_to_string(group.join(file)).ok()?;
         text.trim().parse().ok()
@@ -115,7 +115,7 @@ mod tests {
             ("job_8/memory.max", "10\n"),
             ("job_8/memory.current", "10\n"),
         ]);
-        let own = |path: &str| unused(path, made.path());
+        let own = |path: &str| unused_by_groups(path, made.path());
         assert_eq!(own("0::/job_7/step_0\n"), Some(700));
         assert_eq!(own("0::/job_7\n"), Some(700));
         assert_eq!(own("0::/job_9/step_0\n"), None);
@@ -132,10 +132,10 @@ mod tests {
             ("task/memory.max", "2000"),
             ("task/memory.current", "100"),
         ]);
-        assert_eq!(unused("0::/task", made.path()), Some(1900));
+        assert_eq!(unused_by_groups("0::/task", made.path()), Some(1900));
         // As a container sees it, whose group is the topmost, whatever it is named outside.
-        assert_eq!(unused("0::/", made.path()), Some(4000));
-        assert_eq!(unused("0::/docker/4f", made.path()), Some(4000));
+        assert_eq!(unused_by_groups("0::/", made.path()), Some(4000));
+        assert_eq!(unused_by_groups("0::/docker/4f", made.path()), Some(4000));
     }
 
     #[test]
@@ -152,12 +152,12 @@ mod tests {
             ("memory/memory.usage_in_bytes", "999"),
         ]);
         let own = "9:name=systemd:/\n4:cpu,memory:/job/step\n1:cpu:/other\n0::/\n";
-        assert_eq!(unused(own, made.path()), Some(400));
+        assert_eq!(unused_by_groups(own, made.path()), Some(400));
     }
 
     #[test]
     fn a_group_that_is_over_its_limit_has_nothing_left() {
         let made = groups(&[("memory.max", "5"), ("memory.current", "7")]);
-        assert_eq!(unused("0::/", made.path()), Some(0));
+        assert_eq!(unused_by_groups("0::/", made.path()), Some(0));
     }
 }

@@ -10,19 +10,19 @@ use super::control_group::unused_memory;
 
 /// Sides of the images, in pixels; chosen: 64² pixels squared are 67 MB of 32-bit attention, 256² would be 17 GB,
 /// and is then left out.
-pub(super) const PROBES: [usize; 4] = [64, 128, 256, 512];
+pub(super) const PROBE_SIDES: [usize; 4] = [64, 128, 256, 512];
 
 /// Bytes of one pixel in input and output: three 32-bit floats each.
-const TENSORS: f64 = 24.0;
+const TENSOR_BYTES_PER_PIXEL: f64 = 24.0;
 
 /// Ratio of the growth between the last two probes to what a linear growth would give, from which on it counts as faster;
 /// chosen.
-const CURVED: f64 = 1.25;
+const CURVATURE_RATIO: f64 = 1.25;
 
 /// Bytes of growth that a probe may hide, because it reuses memory that was freed before: blocks above this size go back to
 /// the system at once (`DEFAULT_MMAP_THRESHOLD_MAX` of the GNU C library on 64 bits). With Zero-DCE and RUAS after an image
 /// of 1280 × 720, 22 MB were measured.
-const HIDDEN: f64 = (32 << 20) as f64;
+const MAX_HIDDEN_BYTES: f64 = (32 << 20) as f64;
 
 /// Memory that a model needs: bytes for a pixel, and for a pixel squared.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,7 +35,7 @@ impl MemoryCost {
     /// Cost of the tensors of input and output alone, the least that a run needs.
     pub(super) fn for_tensors() -> Self {
         Self {
-            linear: TENSORS,
+            linear: TENSOR_BYTES_PER_PIXEL,
             square: 0.0,
         }
     }
@@ -56,7 +56,9 @@ impl MemoryCost {
             [a, b, c] if c.1 > b.1 => {
                 let (first, second) = ((b.1 - a.1).max(0.0), c.1 - b.1);
                 let linear = second / (c.0 - b.0);
-                if second <= CURVED * (first + HIDDEN) * (c.0 - b.0) / (b.0 - a.0) {
+                if second
+                    <= CURVATURE_RATIO * (first + MAX_HIDDEN_BYTES) * (c.0 - b.0) / (b.0 - a.0)
+                {
                     return Some(Self {
                         linear,
                         square: 0.0,
@@ -76,7 +78,7 @@ impl MemoryCost {
 
     /// Bytes that a probe of `pixels` needs at worst: if all growth between the last two probes was that of squares. 0 with
     /// fewer than two probes.
-    pub(super) fn at_worst(measured: &[(usize, u64)], pixels: usize) -> f64 {
+    pub(super) fn worst_case_bytes(measured: &[(usize, u64)], pixels: usize) -> f64 {
         let last = measured.len().saturating_sub(2)..;
         let cost = Self::from_probes(&measured[last]);
         cost.map_or(0.0, |cost| cost.bytes(pixels))
@@ -124,7 +126,7 @@ mod tests {
 
     /// Resident bytes after each probe, of a model with such a cost, where freed memory hides some.
     fn measured(hidden: f64, cost: impl Fn(f64) -> f64) -> Vec<(usize, u64)> {
-        let pixels = PROBES.map(|side| side * side).into_iter();
+        let pixels = PROBE_SIDES.map(|side| side * side).into_iter();
         pixels
             .map(|pixels| {
                 let grown = (cost(pixels as f64) - hidden).max(0.0);
@@ -159,7 +161,7 @@ mod tests {
         let [needed, _] = cost.fits(2560 * 1440, 1).unwrap_err();
         assert!((3.0..5.0).contains(&needed), "{needed}");
         for per_pixel in [50.0, 200.0, 1000.0, 20_000.0] {
-            for hidden in [0.0, HIDDEN] {
+            for hidden in [0.0, MAX_HIDDEN_BYTES] {
                 let points = measured(hidden, |pixels| per_pixel * pixels);
                 if let Some(cost) = MemoryCost::from_probes(&points) {
                     assert!(cost.square.abs() < 1e-12, "{per_pixel} {hidden}");
@@ -176,21 +178,23 @@ mod tests {
         let [needed, _] = cost.fits(640 * 480, 8_000_000_000).unwrap_err();
         assert!((needed - 377.5).abs() < 1.0, "{needed}");
         // At a quarter of the size within the graph, with memory hidden.
-        let coarse = measured(HIDDEN, |pixels| 500.0 * pixels + pixels * pixels / 64.0);
+        let coarse = measured(MAX_HIDDEN_BYTES, |pixels| {
+            500.0 * pixels + pixels * pixels / 64.0
+        });
         let [needed, _] = MemoryCost::from_probes(&coarse)
             .unwrap()
             .fits(2560 * 1440, 1)
             .unwrap_err();
         assert!((200.0..250.0).contains(&needed), "{needed}");
         // The third probe would need 17 GB, as two show; without it the estimate is no smaller.
-        let worst = MemoryCost::at_worst(&attention[..2], 256 * 256);
+        let worst = MemoryCost::worst_case_bytes(&attention[..2], 256 * 256);
         assert!((worst / 17.2e9 - 1.0).abs() < 0.1, "{worst}");
         let two = MemoryCost::from_probes(&attention[..2]).unwrap();
         assert!(two.fits(640 * 480, 370_000_000_000).is_err());
         // A linear model passes this bound.
         let linear = measured(0.0, |pixels| 1000.0 * pixels);
-        assert!(MemoryCost::at_worst(&linear[..3], 512 * 512) < 2e9);
-        assert!(MemoryCost::at_worst(&linear[..1], 256 * 256).abs() < 1e-9);
+        assert!(MemoryCost::worst_case_bytes(&linear[..3], 512 * 512) < 2e9);
+        assert!(MemoryCost::worst_case_bytes(&linear[..1], 256 * 256).abs() < 1e-9);
     }
 
     #[test]

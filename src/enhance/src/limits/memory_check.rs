@@ -3,9 +3,9 @@
 //! The estimate is of the size that is really fed, whatever it was made of: a wrong multiple or fixed size of a sidecar makes a
 //! small image large. Nothing that is checked has been allocated yet.
 
-use super::memory::{self, MemoryCost, PROBES};
-use crate::conventions::Tile;
-use crate::failure::{RunFailure, by};
+use super::memory::{self, MemoryCost, PROBE_SIDES};
+use crate::conventions::Locality;
+use crate::failure::{RunFailure, format_size};
 use crate::graphs::{Arena, Graph, RunResult};
 use crate::sizing::{CODES, MAX_WHOLE, SizeRule, TileWindow, texture};
 use darkqa_ground::error::Result;
@@ -57,7 +57,7 @@ impl MemoryCheck {
         Ok(checked.map_err(|[needed, available]| {
             format!(
                 "needs about {needed:.1} GB of memory for {}, but {available:.1} GB are free; {}",
-                by(fed),
+                format_size(fed),
                 remedy(rule, fed, size)
             )
         }))
@@ -65,16 +65,16 @@ impl MemoryCheck {
 }
 
 /// Message for a run on an image of `size` that ONNX Runtime ended because it did not get its memory.
-pub(crate) fn no_memory(failure: &RunFailure, rule: SizeRule, size: [usize; 2]) -> String {
+pub(crate) fn out_of_memory(failure: &RunFailure, rule: SizeRule, size: [usize; 2]) -> String {
     let RunFailure::NoMemory { fed, requested } = failure else {
-        return failure.words();
+        return failure.message();
     };
     let gigabytes = |bytes: u64| format!("{:.1} GB", bytes as f64 / 1e9);
     let requested = requested.map_or(String::new(), |bytes| {
         format!("{} were needed at once, ", gigabytes(bytes))
     });
     let free = memory::available().map_or("too few GB".to_owned(), gigabytes);
-    let (words, remedy) = (failure.words(), remedy(rule, *fed, size));
+    let (words, remedy) = (failure.message(), remedy(rule, *fed, size));
     format!("{words}: {requested}{free} are free; {remedy}")
 }
 
@@ -85,18 +85,18 @@ fn remedy(rule: SizeRule, fed: [usize; 2], size: [usize; 2]) -> String {
     match rule.tile {
         _ if much_larger && !rule.takes_any_size() => format!(
             "the image has only {}: check the size that its graph or MODEL.onnx.toml fixes",
-            by(size)
+            format_size(size)
         ),
         _ if much_larger => format!(
             "the image has only {}: check `multiple = {}` in MODEL.onnx.toml or the preset",
-            by(size),
+            format_size(size),
             rule.multiple
         ),
         _ if !rule.takes_any_size() => {
             "export it for a smaller size, or with dynamic_axes".to_owned()
         }
-        Some(Tile::None) => SMALLER.to_owned(),
-        Some(Tile::Exact(_)) => "--llie-options tile=256 needs a fraction of it".to_owned(),
+        Some(Locality::Global) => SMALLER.to_owned(),
+        Some(Locality::Exact(_)) => "--llie-options tile=256 needs a fraction of it".to_owned(),
         None => format!(
             "--llie-options tile=256 needs a fraction of it if a pixel depends only on the pixels around it; otherwise {SMALLER}"
         ),
@@ -110,8 +110,8 @@ fn measure(graph: &Graph, rule: SizeRule, available: u64) -> Result<Estimate> {
         return Ok(Estimate::Tensors);
     }
     // Sides that suit common multiples; a multiple that no small image has is likely wrong, and is not probed.
-    let sides = PROBES.map(|side| match rule.multiple {
-        multiple if multiple <= PROBES[0] => side.next_multiple_of(multiple),
+    let sides = PROBE_SIDES.map(|side| match rule.multiple {
+        multiple if multiple <= PROBE_SIDES[0] => side.next_multiple_of(multiple),
         _ => side,
     });
     let mut measured: Vec<(usize, u64)> = Vec::new();
@@ -120,7 +120,7 @@ fn measure(graph: &Graph, rule: SizeRule, available: u64) -> Result<Estimate> {
         return Ok(Estimate::Tensors);
     }
     for side in sides {
-        if MemoryCost::at_worst(&measured, side * side) > available as f64 / 2.0 {
+        if MemoryCost::worst_case_bytes(&measured, side * side) > available as f64 / 2.0 {
             break;
         }
         let ran = probe(graph, side, Arena::Kept)?;

@@ -12,10 +12,10 @@ use super::memory::{available, resident};
 pub struct MemoryLimit(Option<u64>);
 
 /// Share of the memory that is free at the start which an enhancer may take by default; chosen: the rest is for what else runs.
-const SHARE: f64 = 0.8;
+const FREE_SHARE: f64 = 0.8;
 
 /// Time between two looks at the memory; chosen. A process gets some 1 GB in that time, and a look costs some 20 µs.
-const LOOK: Duration = Duration::from_millis(100);
+const POLL_INTERVAL: Duration = Duration::from_millis(100);
 
 const GIGABYTE: f64 = 1e9;
 
@@ -27,12 +27,12 @@ impl MemoryLimit {
     #[must_use]
     pub fn automatic() -> Self {
         let now = resident().zip(available());
-        Self(now.map(|(resident, free)| resident + (SHARE * free as f64) as u64))
+        Self(now.map(|(resident, free)| resident + (FREE_SHARE * free as f64) as u64))
     }
 
     /// The time after which to look at the memory again; `None` without a limit.
-    pub(crate) fn look(self) -> Option<Duration> {
-        self.0.map(|_| LOOK)
+    pub(crate) fn poll_interval(self) -> Option<Duration> {
+        self.0.map(|_| POLL_INTERVAL)
     }
 
     /// Whether the process takes more.

@@ -11,7 +11,7 @@ use darkqa_ground::types::flags::seconds;
 pub struct TimeLimit(Option<Duration>);
 
 /// Images in a row that may take too much time or memory before the enhancer is not run any more; chosen.
-pub(crate) const MOST_ENDED: usize = 3;
+pub(crate) const MAX_CONSECUTIVE_OVERRUNS: usize = 3;
 
 /// Time, as a multiple of the limit, after which a run that was told to end counts as stuck; chosen. ONNX Runtime ends a run
 /// only between two nodes of its graph.
@@ -74,7 +74,7 @@ impl ImageClock {
     }
 
     /// Time that is left; `None` without a limit.
-    pub(crate) fn left(self) -> Option<Duration> {
+    pub(crate) fn remaining(self) -> Option<Duration> {
         Some(self.limit.get()?.saturating_sub(self.used))
     }
 
@@ -120,11 +120,11 @@ mod tests {
     fn the_runs_of_an_image_share_its_time() {
         let mut clock = ImageClock::new("2".parse().unwrap());
         clock.add(Duration::from_millis(1500));
-        assert_eq!(clock.left(), Some(Duration::from_millis(500)));
+        assert_eq!(clock.remaining(), Some(Duration::from_millis(500)));
         clock.add(Duration::from_secs(9));
-        assert_eq!(clock.left(), Some(Duration::ZERO));
+        assert_eq!(clock.remaining(), Some(Duration::ZERO));
         clock.restart();
-        assert_eq!(clock.left(), Some(Duration::from_secs(2)));
-        assert_eq!(ImageClock::new(TimeLimit::NONE).left(), None);
+        assert_eq!(clock.remaining(), Some(Duration::from_secs(2)));
+        assert_eq!(ImageClock::new(TimeLimit::NONE).remaining(), None);
     }
 }

@@ -4,7 +4,9 @@
 //! goes through floats: range, `image`, chroma, in this order; then all is clamped and rounded.
 
 use super::output::INPUT;
-use super::reading::{Certainty, OutOfRange, OutputReading, TensorSamples, check};
+use super::output_decoding::{
+    Certainty, InvalidValues, OutputDecoding, TensorSamples, check_values,
+};
 use crate::conventions::sidecar::ModelSidecar;
 use crate::conventions::{Channels, Rounding, Signature, TensorLayout, ValueRange};
 use crate::expressions::Expression;
@@ -16,7 +18,7 @@ use crate::sizing::TileWindow;
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Composition {
     /// How each output is read.
-    pub(crate) outputs: Vec<OutputReading>,
+    pub(crate) outputs: Vec<OutputDecoding>,
     /// The image as an expression of the outputs; `None` for the only output itself.
     image: Option<Expression>,
     channels: Channels,
@@ -38,21 +40,21 @@ pub(crate) struct ImageTensor<'a> {
 }
 
 /// An output that cannot be an image of the size that was fed.
-pub(crate) struct OtherSize {
+pub(crate) struct WrongSize {
     /// Order of its dimensions, if it is an image.
     layout: TensorLayout,
     dims: Vec<i64>,
 }
 
-impl OtherSize {
+impl WrongSize {
     /// The failure of the run on an image of this size.
     pub(crate) fn failure(self, fed: [usize; 2]) -> RunFailure {
-        let [_, height, width] = self.layout.places();
+        let [_, height, width] = self.layout.axes();
         let side = |place: usize| usize::try_from(*self.dims.get(place)?).ok();
         let given = side(height)
             .zip(side(width))
             .map(|(height, width)| [height, width]);
-        RunFailure::OtherSize {
+        RunFailure::WrongSize {
             fed,
             given: given.filter(|_| self.dims.len() == self.layout.rank()),
             dims: self.dims,
@@ -71,7 +73,7 @@ impl Composition {
         let outputs = signature.outputs.iter();
         let composition = Self {
             outputs: outputs
-                .map(|output| OutputReading::new(output, &signature.input, convention))
+                .map(|output| OutputDecoding::new(output, &signature.input, convention))
                 .collect(),
             image,
             channels,
@@ -113,19 +115,19 @@ impl Composition {
     }
 
     /// The outputs of a run on an image of this size; the error is one that cannot be an image of it.
-    pub(crate) fn laid_out<'a>(
+    pub(crate) fn assign_layouts<'a>(
         &self,
         outputs: &[OutputTensor<'a>],
         size: [usize; 2],
-    ) -> Result<Vec<ImageTensor<'a>>, OtherSize> {
+    ) -> Result<Vec<ImageTensor<'a>>, WrongSize> {
         self.outputs
             .iter()
             .zip(outputs)
-            .map(|(reading, output)| {
-                let layout = reading
+            .map(|(decoding, output)| {
+                let layout = decoding
                     .layout(&output.dims, size)
-                    .ok_or_else(|| OtherSize {
-                        layout: reading.layout.unwrap_or(reading.preferred),
+                    .ok_or_else(|| WrongSize {
+                        layout: decoding.layout.unwrap_or(decoding.preferred),
                         dims: output.dims.clone(),
                     })?;
                 Ok(ImageTensor {
@@ -143,7 +145,7 @@ impl Composition {
         size: [usize; 2],
         part: TileWindow,
         dark: Option<&Planes>,
-    ) -> Result<Vec<u8>, OutOfRange> {
+    ) -> Result<Vec<u8>, InvalidValues> {
         if self.is_plain() {
             let ImageTensor { samples, layout } = outputs[0];
             return self.outputs[0].bytes(samples, layout.0, size, part);
@@ -160,23 +162,23 @@ impl Composition {
         size: [usize; 2],
         part: TileWindow,
         dark: Option<&Planes>,
-    ) -> Result<Planes, OutOfRange> {
+    ) -> Result<Planes, InvalidValues> {
         let mut planes = self
             .outputs
             .iter()
             .zip(outputs)
-            .map(|(reading, output)| {
+            .map(|(decoding, output)| {
                 // The operands of an expression may have any range.
                 let certainty = match self.image {
-                    None => reading.certainty,
+                    None => decoding.certainty,
                     Some(_) => Certainty::Known,
                 };
-                reading.planes(output.samples, output.layout, size, part, certainty)
+                decoding.planes(output.samples, output.layout, size, part, certainty)
             })
             .collect::<Result<Vec<_>, _>>()?;
         let made = match &self.image {
             None => planes.swap_remove(0),
-            Some(image) => self.evaluated(image, &planes, dark)?,
+            Some(image) => self.evaluate_image(image, &planes, dark)?,
         };
         Ok(match (self.channels, dark) {
             (Channels::Y, Some(dark)) => dark.with_luma(&made),
@@ -185,12 +187,12 @@ impl Composition {
     }
 
     /// The expression of the image.
-    fn evaluated(
+    fn evaluate_image(
         &self,
         image: &Expression,
         outputs: &[Planes],
         dark: Option<&Planes>,
-    ) -> Result<Planes, OutOfRange> {
+    ) -> Result<Planes, InvalidValues> {
         let mut outputs = outputs.iter();
         let size = outputs.as_slice()[0].size();
         let images = image.names().iter().filter_map(|name| match name.as_str() {
@@ -202,7 +204,7 @@ impl Composition {
             ValueRange::Unit => self.outputs[0].certainty,
             ValueRange::Bytes | ValueRange::Signed => Certainty::Known,
         };
-        check(&made.samples, ValueRange::Unit, certainty)?;
+        check_values(&made.samples, ValueRange::Unit, certainty)?;
         Ok(made)
     }
 }

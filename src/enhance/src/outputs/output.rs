@@ -3,7 +3,7 @@
 use crate::conventions::sidecar::{ADD, OutputChoice};
 use crate::conventions::{Channels, ElementType, TensorLayout, preset};
 use crate::expressions::{ChannelSlice, Expression};
-use crate::graphs::{Dim, Port, list};
+use crate::graphs::{Dim, Port, format_ports};
 
 /// Names that exporters give the enhanced image if a model has other outputs too.
 const IMAGE_NAMES: [&str; 8] = [
@@ -45,20 +45,20 @@ impl Output {
         fits: impl Fn(&Port, usize) -> bool,
     ) -> Result<Self, String> {
         if let Some(OutputChoice::Name(name)) = stated
-            && let Some((port, slice)) = sliced(outputs, name)
+            && let Some((port, slice)) = find_slice(outputs, name)
         {
             if slice.count() != channels.count() {
                 return Err(format!(
                     "MODEL.onnx.toml or the preset sets output = {name:?}, {} channels; expected {}",
                     slice.count(),
-                    channels.words()
+                    channels.description()
                 ));
             }
             return Self::from_slice(port, slice, fits);
         }
         let fits_count = &fits;
         let fits = |port: &Port| fits_count(port, channels.count());
-        let images = image_outputs(outputs, fits);
+        let images = candidate_images(outputs, fits);
         let (index, reason) = match (images.as_slice(), stated) {
             ([only], None) => (*only, "the only output that can be the image"),
             // An index may count the outputs of the authors' model. An export may have fewer.
@@ -66,12 +66,12 @@ impl Output {
                 (*only, "the only output")
             }
             (_, Some(choice)) => (stated_output(outputs, choice, fits)?, "stated"),
-            ([], None) => return Err(no_image(outputs, channels, fits_count)),
-            (several, None) => match (by_name(outputs, several), by_structure(outputs)) {
+            ([], None) => return Err(no_image_message(outputs, channels, fits_count)),
+            (several, None) => match (index_by_name(outputs, several), zero_dce_index(outputs)) {
                 (Some(name), None) => (name, "its name"),
                 (None, Some(structure)) => (structure, "the second of Zero-DCE's three outputs"),
                 (Some(name), Some(structure)) if name == structure => (name, "its name"),
-                _ => return Err(ambiguous(outputs)),
+                _ => return Err(ambiguous_message(outputs)),
             },
         };
         let port = outputs[index].clone();
@@ -88,7 +88,7 @@ impl Output {
     ///
     /// # Errors
     /// If a name is neither an output nor `input`, or an output is no image of one or three channels.
-    pub(crate) fn named(
+    pub(crate) fn for_expression(
         outputs: &[Port],
         image: &Expression,
         channels: Channels,
@@ -103,16 +103,16 @@ impl Output {
         let slices: Vec<&str> = image
             .names()
             .iter()
-            .filter(|name| sliced(outputs, name).is_some())
+            .filter(|name| find_slice(outputs, name).is_some())
             .map(String::as_str)
             .collect();
         let known_names = [&known[..], &slices].concat();
         image
             .check_names("image", &known_names)
-            .map_err(|problem| format!("{problem}; outputs: {}", list(outputs)))?;
+            .map_err(|problem| format!("{problem}; outputs: {}", format_ports(outputs)))?;
         let outputs: Vec<Self> = image.names().iter().filter(|name| *name != INPUT)
             .map(|name| {
-                if let Some((port, slice)) = sliced(outputs, name) {
+                if let Some((port, slice)) = find_slice(outputs, name) {
                     return Self::from_slice(port, slice, &fits);
                 }
                 let port = outputs.iter().find(|port| port.name == *name);
@@ -120,7 +120,7 @@ impl Output {
                     format!(
                         "image = \"{image}\" names output {name:?}, which is not an image of {}; outputs: {}",
                         if channels == [1] { "one channel (channels = \"y\")" } else { "one or three channels" },
-                        list(outputs)
+                        format_ports(outputs)
                     )
                 })?;
                 Ok(Self {
@@ -174,7 +174,7 @@ impl Output {
 }
 
 /// Indices of the outputs that can be the image: those whose dimensions the graph states, else those without stated dimensions.
-fn image_outputs(outputs: &[Port], fits: impl Fn(&Port) -> bool) -> Vec<usize> {
+fn candidate_images(outputs: &[Port], fits: impl Fn(&Port) -> bool) -> Vec<usize> {
     let fitting = |has_dims: bool| -> Vec<usize> {
         (0..outputs.len())
             .filter(|&i| outputs[i].dims.is_empty() != has_dims && fits(&outputs[i]))
@@ -189,7 +189,7 @@ fn image_outputs(outputs: &[Port], fits: impl Fn(&Port) -> bool) -> Vec<usize> {
 }
 
 /// The output and the channels that a name such as `x[4:7]` means; `None` if it means no channels of an output.
-fn sliced<'a>(outputs: &'a [Port], name: &str) -> Option<(&'a Port, ChannelSlice)> {
+fn find_slice<'a>(outputs: &'a [Port], name: &str) -> Option<(&'a Port, ChannelSlice)> {
     if outputs.iter().any(|port| port.name == name) {
         return None;
     }
@@ -199,7 +199,7 @@ fn sliced<'a>(outputs: &'a [Port], name: &str) -> Option<(&'a Port, ChannelSlice
 }
 
 /// A name as expressions write it, in backticks if needed.
-pub(crate) fn in_expression(name: &str) -> String {
+pub(crate) fn expression_name(name: &str) -> String {
     if name
         .chars()
         .all(|c: char| c.is_ascii_alphanumeric() || c == '_')
@@ -217,7 +217,11 @@ pub(crate) fn light_map_line(term: &str) -> String {
 }
 
 /// Why none of the outputs is the image, and what to state or export.
-fn no_image(outputs: &[Port], channels: Channels, fits: impl Fn(&Port, usize) -> bool) -> String {
+fn no_image_message(
+    outputs: &[Port],
+    channels: Channels,
+    fits: impl Fn(&Port, usize) -> bool,
+) -> String {
     let wide = |port: &&Port| {
         port.channel_counts()
             .into_iter()
@@ -231,14 +235,14 @@ fn no_image(outputs: &[Port], channels: Channels, fits: impl Fn(&Port, usize) ->
         return match count {
             4 => format!(
                 "gives {port}, 4 channels, but an image has 3; if the fourth is opacity, {ADD}: `output = \"{name}[0:3]\"`; if they are reflectance and light: `image = \"{0}[0:3] * {0}[3:4]\"`",
-                in_expression(name)
+                expression_name(name)
             ),
             6 => format!(
                 "gives {port}, 6 channels, but an image has 3; {ADD} the half that is the image: `output = \"{name}[0:3]\"` or `output = \"{name}[3:6]\"`"
             ),
             24 => format!(
                 "gives {port}, 24 channels, but an image has 3; if they are the curves of Zero-DCE, {ADD}: `image = \"curves(input, {0}[0:3], {0}[3:6], {0}[6:9], {0}[9:12], {0}[12:15], {0}[15:18], {0}[18:21], {0}[21:24])\"`",
-                in_expression(name)
+                expression_name(name)
             ),
             _ => format!(
                 "gives {port}, {count} channels, but an image has 3; {ADD} those that are the image (from 0, end excluded): `output = \"{name}[{}:{count}]\"`",
@@ -251,7 +255,7 @@ fn no_image(outputs: &[Port], channels: Channels, fits: impl Fn(&Port, usize) ->
     {
         return format!(
             "gives {port}, one channel, not an image; if it is a light map that the input is divided by, {ADD}: `{}`; if it is the enhanced luma, export it joined with the colours",
-            light_map_line(&in_expression(&port.name))
+            light_map_line(&expression_name(&port.name))
         );
     }
     if let [port] = outputs {
@@ -260,7 +264,7 @@ fn no_image(outputs: &[Port], channels: Channels, fits: impl Fn(&Port, usize) ->
                 "not a tensor of numbers; export it so that it gives one image as float32"
                     .to_owned(),
             ),
-            (element, _) if !element.is_read() => {
+            (element, _) if !element.is_output_type() => {
                 Some("an unsupported type; export it so that it gives float32 or uint8".to_owned())
             }
             (_, 1 | 2) => Some(
@@ -283,7 +287,7 @@ fn no_image(outputs: &[Port], channels: Channels, fits: impl Fn(&Port, usize) ->
     };
     format!(
         "has no output that is {what} of the input's size; outputs: {}",
-        list(outputs)
+        format_ports(outputs)
     )
 }
 
@@ -291,8 +295,8 @@ fn no_image(outputs: &[Port], channels: Channels, fits: impl Fn(&Port, usize) ->
 pub(super) const INPUT: &str = "input";
 
 /// Question to the user if the image among the outputs is unknown. Presets that know such a list are named.
-fn ambiguous(outputs: &[Port]) -> String {
-    let presets = preset::that_know(outputs);
+fn ambiguous_message(outputs: &[Port]) -> String {
+    let presets = preset::with_outputs(outputs);
     let presets = match presets.as_slice() {
         [] => String::new(),
         names => {
@@ -304,7 +308,7 @@ fn ambiguous(outputs: &[Port]) -> String {
     };
     format!(
         "has several outputs that could be the image: {}; {ADD}: `output = \"NAME\"` or `output = INDEX` (from 0){presets}; `darkqa-eval enhance doctor` shows which are plausible",
-        list(outputs)
+        format_ports(outputs)
     )
 }
 
@@ -325,14 +329,14 @@ fn stated_output(
     };
     Err(format!(
         "MODEL.onnx.toml or the preset sets {choice}, {problem}; outputs: {}",
-        list(outputs)
+        format_ports(outputs)
     ))
 }
 
 /// The only image output that has one of [`IMAGE_NAMES`].
 ///
 /// A name of the first output counts only if the others are named too: see [`Port::is_numbered`].
-fn by_name(outputs: &[Port], images: &[usize]) -> Option<usize> {
+fn index_by_name(outputs: &[Port], images: &[usize]) -> Option<usize> {
     let mut matching = images
         .iter()
         .copied()
@@ -346,7 +350,7 @@ fn by_name(outputs: &[Port], images: &[usize]) -> Option<usize> {
 ///
 /// `enhance_net_nopool.forward` of <https://github.com/Li-Chongyi/Zero-DCE> returns the image after four curves, the
 /// image after all eight, and the 8 × 3 = 24 channels of the curves themselves. No other published model has this shape.
-fn by_structure(outputs: &[Port]) -> Option<usize> {
+fn zero_dce_index(outputs: &[Port]) -> Option<usize> {
     let channels: Vec<Option<usize>> = outputs
         .iter()
         .map(|port| port.dims.get(1).and_then(Dim::known))

@@ -7,19 +7,19 @@ mod proposal;
 use std::collections::BTreeSet;
 
 use super::expressions::{ExpressionTrial, OutputKind};
-use super::plausible::{Codes, Facts};
+use super::plausible::{Facts, UnclampedImage};
 use super::probe::{PairTrial, Probe};
 use super::probe_run::Trials;
 use super::range_pair::RangePair;
-use super::trial_images::made;
+use super::trial_images::run_frames;
 use crate::conventions::sidecar::{self, ADD, ModelSidecar, OutputChoice};
 use crate::conventions::{ChannelOrder, ValueScale};
 use crate::enhancer::Enhancer;
 use crate::graphs::Port;
-use crate::sizing::TakenSizes;
+use crate::sizing::AcceptedSizes;
 use darkqa_ground::error::Result;
 use darkqa_ground::types::Rgb;
-use proposal::{Found, propose};
+use proposal::{Proposal, propose};
 pub use proposal::{ProposedLine, Settled};
 
 /// Results of a model on dark frames, by convention.
@@ -79,7 +79,7 @@ impl Enhancer {
         let sizes = self.try_sizes(dark);
         let order = self.other_order();
         let trials = self.trials_of_all(dark)?.ok_or_else(|| {
-            self.fault(format!(
+            self.error(format!(
                 "fails at 144 × 96, 160 × 120 and 128 × 128; {ADD} the sizes that it takes: `multiple = N` or `fixed = [WIDTH, HEIGHT]`"
             ))
         })?;
@@ -96,15 +96,17 @@ impl Enhancer {
         let stated = self.stated_pair();
         let is_plausible = |pair: &RangePair| probe.plausible().contains(pair);
         let mut found = match (image, stated) {
-            (ImageOutput::Unknown, _) => Found::no_output(&self.output_title(), &probe, &plausible),
-            (ImageOutput::Known, Some(pair)) if is_plausible(&pair) => Found::stated(pair),
+            (ImageOutput::Unknown, _) => {
+                Proposal::for_unknown_output(&self.output_title(), &probe, &plausible)
+            }
+            (ImageOutput::Known, Some(pair)) if is_plausible(&pair) => Proposal::for_stated(pair),
             (ImageOutput::Known, _) => propose(&probe, stated, &swapped, order),
         };
         if !found.lines.is_empty() {
             found.lines.extend(self.found_size());
         }
         if image == ImageOutput::Known {
-            found.mention(&plausible);
+            found.mention_outputs(&plausible);
         }
         if image == ImageOutput::Known {
             let kind = self.kind_by_endpoints(probe.best())?;
@@ -142,7 +144,7 @@ impl Enhancer {
             frames,
             columns,
             proposal: found.lines,
-            conclusion: sidecar::named(&found.conclusion, self.path()),
+            conclusion: sidecar::insert_sidecar_name(&found.conclusion, self.path()),
             sizes,
         })
     }
@@ -219,8 +221,8 @@ impl Enhancer {
     /// The line for the size that was found by trial.
     fn found_size(&self) -> Option<ProposedLine> {
         let line = match self.found_sizes()? {
-            TakenSizes::Multiple(multiple) => format!("multiple = {multiple}"),
-            TakenSizes::Traced([height, width]) => format!("fixed = [{width}, {height}]"),
+            AcceptedSizes::Multiple(multiple) => format!("multiple = {multiple}"),
+            AcceptedSizes::Traced([height, width]) => format!("fixed = [{width}, {height}]"),
         };
         let reason = "found by trial: it fails at other sizes".to_owned();
         Some(ProposedLine { line, reason })
@@ -240,7 +242,7 @@ impl Enhancer {
 
     /// The images of the outputs that are not read.
     fn other_outputs(&self, frames: &[Rgb], ranges: RangePair) -> Result<Vec<ExaminedConvention>> {
-        let seen: Vec<Codes> = frames.iter().map(Codes::from_rgb).collect();
+        let seen: Vec<UnclampedImage> = frames.iter().map(UnclampedImage::from_rgb).collect();
         let mut columns = Vec::new();
         for Port { name, .. } in &self.graph().signature.unread {
             let convention = ModelSidecar {
@@ -248,12 +250,14 @@ impl Enhancer {
                 image: None,
                 ..self.convention().clone()
             };
-            let convention = convention.fed(ranges.input).read(ranges.output);
+            let convention = convention
+                .with_input_scale(ranges.input)
+                .with_output_scale(ranges.output);
             // An output that is no image, such as curves, is left out.
             let Ok(graph) = self.graph().with_convention(convention) else {
                 continue;
             };
-            let made = made(&[graph], frames)?;
+            let made = run_frames(&[graph], frames)?;
             if let Some(made) = made.and_then(|mut made| made.pop()) {
                 let pair = PairTrial::new(ranges, &seen, made);
                 columns.push(column(&pair, format!("output {name:?}, {ranges}")));

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::plausible::Codes;
+use super::plausible::UnclampedImage;
 use darkqa_ground::types::Rgb;
 
 /// Height and width of the image of black and white, in pixels, where the model takes any: that of the first frames of the probe.
@@ -21,16 +21,16 @@ pub(super) struct Endpoints {
 }
 
 /// Largest distance of black and white from themselves, in codes, at which they count as near. Chosen.
-const NEAR: f64 = 50.0;
+const MAX_DISTANCE: f64 = 50.0;
 
 impl Endpoints {
     /// Whether black and white stay near to themselves.
     pub(super) fn are_near(self) -> bool {
-        self.distance <= NEAR
+        self.distance <= MAX_DISTANCE
     }
 
     /// The means of an output for [`black_and_white`], away from the edge between the halves and from the border.
-    pub(super) fn from_codes(codes: &Codes) -> Self {
+    pub(super) fn from_codes(codes: &UnclampedImage) -> Self {
         let half = codes.width / 2;
         let quarter = half / 4;
         let black = channel_means(codes, quarter..half - quarter);
@@ -44,8 +44,8 @@ impl Endpoints {
 }
 
 /// Means of red, green and blue in these columns of the middle half of the rows, in codes.
-fn channel_means(codes: &Codes, columns: Range<usize>) -> [f64; 3] {
-    let Codes { height, width, .. } = *codes;
+fn channel_means(codes: &UnclampedImage, columns: Range<usize>) -> [f64; 3] {
+    let UnclampedImage { height, width, .. } = *codes;
     let rows = height / 4..(height - height / 4).max(1);
     let pixels = rows.len() * columns.len();
     let mut sums = [0.0; 3];
@@ -80,7 +80,7 @@ mod tests {
 
     #[test]
     fn black_and_white_have_their_own_codes() {
-        let codes = Codes::from_rgb(&black_and_white([96, 144]));
+        let codes = UnclampedImage::from_rgb(&black_and_white([96, 144]));
         let expected = Endpoints {
             black: 0.0,
             white: 255.0,
@@ -92,7 +92,7 @@ mod tests {
     #[test]
     fn smallest_images_have_finite_endpoints() {
         for size in [[1, 1], [1, 2], [2, 1]] {
-            let codes = Codes::from_rgb(&black_and_white(size));
+            let codes = UnclampedImage::from_rgb(&black_and_white(size));
             assert!(
                 Endpoints::from_codes(&codes).distance.is_finite(),
                 "{size:?}"

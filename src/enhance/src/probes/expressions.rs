@@ -7,7 +7,7 @@ use super::range_pair::RangePair;
 use crate::conventions::sidecar::ADD;
 use crate::conventions::{Channels, ValueRange};
 use crate::enhancer::Enhancer;
-use crate::outputs::{in_expression, light_map_line};
+use crate::outputs::{expression_name, light_map_line};
 use darkqa_ground::error::Result;
 use darkqa_ground::types::{Flaw, Rgb};
 
@@ -81,14 +81,14 @@ impl Enhancer {
         let ranges = self
             .stated_ranges()
             .map(|range| range.or(Some(ValueRange::Unit)));
-        let name = in_expression(&self.graph().signature.outputs[0].port.name);
+        let name = expression_name(&self.graph().signature.outputs[0].port.name);
         let texts = EXPRESSIONS.map(|(text, _)| text.replace("OUTPUT", &name));
         let mut conventions = texts.clone().map(|_| self.convention().clone());
         for (convention, text) in conventions.iter_mut().zip(&texts) {
             convention.output = None;
             let image = text
                 .parse()
-                .map_err(|problem: String| self.fault(problem))?;
+                .map_err(|problem: String| self.error(problem))?;
             convention.image = Some(image);
         }
         let conventions = conventions.each_ref();
@@ -160,7 +160,7 @@ impl Enhancer {
         let Some(kind) = self.kind_by_endpoints(ranges)? else {
             return Ok(None);
         };
-        let name = in_expression(&self.graph().signature.outputs[0].port.name);
+        let name = expression_name(&self.graph().signature.outputs[0].port.name);
         Ok(Some(match kind {
             OutputKind::Residual => format!(
                 "its output is nearly black for a white image, like a residual; if the model's code adds it, {ADD}: `image = \"input + {name}\"`; `darkqa-eval enhance doctor` shows both"
@@ -180,7 +180,7 @@ impl Enhancer {
         let name = &self.graph().signature.outputs[0].port.name;
         let lower_case = name.to_lowercase();
         NAMES.iter().find(|word| lower_case.contains(**word))?;
-        let term = in_expression(name);
+        let term = expression_name(name);
         Some(format!(
             "its output {name:?} is named like a map or a residual, but read as the image; {ADD} what the model's code does: `{}`, `image = \"input + {term}\"` or `output = {name:?}`",
             light_map_line(&term)

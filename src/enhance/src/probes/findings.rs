@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::usage::{Implausible, Usage};
 use crate::enhancer::Enhancer;
-use crate::sizing::TakenSizes;
+use crate::sizing::AcceptedSizes;
 use darkqa_ground::error::Result;
 use darkqa_ground::types::EnhancerName;
 use darkqa_ground::types::manifests::{ConventionLine, ProbeNote, ProbeOutcome};
@@ -53,7 +53,7 @@ impl Findings {
             tracing::warn!("{name}: {remark}");
         }
         match &self.probe {
-            None => warn_of_untried(name),
+            None => warn_not_probed(name),
             Some(probe) => {
                 if let Some(problem) = &probe.problem {
                     tracing::warn!("{name}: {problem}");
@@ -64,7 +64,7 @@ impl Findings {
 }
 
 /// Warns about a model that takes none of the sizes of the probe.
-pub(super) fn warn_of_untried(name: &EnhancerName) {
+pub(super) fn warn_not_probed(name: &EnhancerName) {
     tracing::warn!(
         "{name}: its images were not checked, because it fails at small sizes such as 144 × 96; look at some of them"
     );
@@ -72,7 +72,7 @@ pub(super) fn warn_of_untried(name: &EnhancerName) {
 
 impl Enhancer {
     /// Why its images may be read in a wrong way, if it is used in spite of it; to be called after the probe.
-    pub fn used_anyway(&self) -> Option<String> {
+    pub fn overruled_problem(&self) -> Option<String> {
         let probe = self.usage().note().probe?;
         let is_overruled = probe.outcome == ProbeOutcome::Overruled;
         probe.problem.filter(|_| is_overruled)
@@ -85,7 +85,7 @@ impl Enhancer {
             convention: note.convention,
             probe: note.probe,
             remarks: note.remarks,
-            sizes: self.found_sizes().map(TakenSizes::words),
+            sizes: self.found_sizes().map(AcceptedSizes::message),
         }
     }
 
@@ -93,11 +93,11 @@ impl Enhancer {
     ///
     /// # Errors
     /// If the graph contradicts its own convention, which is a bug.
-    pub fn tried_before(self, findings: &Findings, usage: Usage) -> Result<Self> {
+    pub fn with_findings(self, findings: &Findings, usage: Usage) -> Result<Self> {
         let mut enhancer = self.with_usage(usage);
         enhancer.set_remarks(&findings.remarks);
         if let Some(probe) = &findings.probe {
-            enhancer.set_probed(probe.clone())?;
+            enhancer.set_probe_result(probe.clone())?;
         }
         Ok(enhancer)
     }

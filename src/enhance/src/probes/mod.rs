@@ -13,7 +13,7 @@ mod usage;
 
 pub use doctor::{Examination, ImageOutput, ProposedLine, Settled};
 pub use findings::Findings;
-pub(super) use plausible::Codes;
+pub(super) use plausible::UnclampedImage;
 pub use plausible::{DARK, brightness};
 pub use probe::FRAMES;
 pub(super) use range_pair::RangePair;

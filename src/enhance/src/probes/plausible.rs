@@ -18,13 +18,13 @@ pub const DARK: f64 = 64.0;
 const JUDGED_SIDE: usize = 160;
 /// Share of the pixels that count as the darkest.
 const DARKEST_SHARE: f64 = 0.01;
-/// How much nearer to the mean the darkest pixels must be than in the dark frame, as a ratio, for a haze. Codes of light that is dimmed
+/// How much nearer to the mean the darkest pixels must be than in the dark frame, as a ratio, for a haze. UnclampedImage of light that is dimmed
 /// keep their ratios, as their curve is nearly a power. Chosen: noise moves the ratio less.
-const LIFTED: f64 = 1.5;
+const HAZE_RATIO: f64 = 1.5;
 /// Mean difference of the channels of blocks, in codes, above which a dark frame has colours, and below which an output has none. Chosen:
 /// noise of single pixels does not reach the first, and only three equal channels stay below the second.
-const COLOURED: f64 = 1.0;
-const GREY: f64 = 0.1;
+const MIN_COLOUR: f64 = 1.0;
+const MAX_GREY: f64 = 0.1;
 /// Side of the blocks whose means are compared, in pixels; chosen, so that noise is averaged out.
 const BLOCK: usize = 4;
 
@@ -70,16 +70,16 @@ impl fmt::Display for Verdict {
 
 /// An output of a model: red, green and blue of each pixel in codes of 0..255, neither clamped nor rounded.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Codes {
+pub(crate) struct UnclampedImage {
     pub(super) height: usize,
     pub(super) width: usize,
     /// The samples, height × width × 3.
     pub(super) samples: Vec<f32>,
 }
 
-impl Codes {
-    /// Codes of this height and width that are no numbers: those of an output whose values cannot be an image.
-    pub(crate) fn unusable([height, width]: [usize; 2]) -> Self {
+impl UnclampedImage {
+    /// UnclampedImage of this height and width that are no numbers: those of an output whose values cannot be an image.
+    pub(crate) fn not_a_number([height, width]: [usize; 2]) -> Self {
         Self {
             height,
             width,
@@ -102,7 +102,7 @@ impl Codes {
 
     /// The codes of an image, reduced by a whole factor to at most [`JUDGED_SIDE`] pixels: each sample is the mean of a square. The
     /// rest at the right and below is left out.
-    pub(super) fn small(image: &Rgb) -> Self {
+    pub(super) fn downscaled(image: &Rgb) -> Self {
         let longer = image.height().max(image.width());
         let factor = longer.div_ceil(JUDGED_SIDE);
         let [height, width] = [image.height(), image.width()].map(|side| side / factor);
@@ -257,7 +257,7 @@ pub fn brightness(image: &Rgb) -> f64 {
 }
 
 /// First flaw that is found in an output for a dark image of the same size; `None` if the output is plausible.
-pub(super) fn judge(dark: &Codes, made: &Codes) -> Option<Verdict> {
+pub(super) fn judge(dark: &UnclampedImage, made: &UnclampedImage) -> Option<Verdict> {
     let count = made.samples.len() as f64;
     let share = |is: &dyn Fn(&f32) -> bool| {
         made.samples.iter().filter(|value| is(value)).count() as f64 / count
@@ -301,15 +301,16 @@ pub(super) fn judge(dark: &Codes, made: &Codes) -> Option<Verdict> {
     if (strength / was.len() as f64).sqrt() > 0.06 && cosine < -0.25 {
         return impossible(Flaw::Hue, cosine);
     }
-    let [was, is] = [dark, made].map(Codes::colour);
-    if was > COLOURED && is < GREY {
+    let [was, is] = [dark, made].map(UnclampedImage::colour);
+    if was > MIN_COLOUR && is < MAX_GREY {
         return doubtful(Flaw::Grey, is);
     }
     let darkest = percentile(&after.samples, DARKEST_SHARE);
     // A pale room has no dark pixel either: in its dark frame, too, the darkest pixels are near to the mean.
     let [was, is] = [&before.samples, &after.samples]
         .map(|plane| percentile(plane, DARKEST_SHARE) / mean(plane).max(f64::MIN_POSITIVE));
-    (darkest > 100.0 && is > LIFTED * was).then(|| verdict(Flaw::Haze, Gravity::Doubtful, darkest))
+    (darkest > 100.0 && is > HAZE_RATIO * was)
+        .then(|| verdict(Flaw::Haze, Gravity::Doubtful, darkest))
 }
 
 fn verdict(flaw: Flaw, gravity: Gravity, figure: f64) -> Verdict {

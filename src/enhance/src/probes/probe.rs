@@ -6,7 +6,7 @@
 use std::fmt;
 
 use super::endpoints::Endpoints;
-use super::plausible::{Codes, Gravity, Verdict, judge};
+use super::plausible::{Gravity, UnclampedImage, Verdict, judge};
 use super::range_pair::RangePair;
 use crate::conventions::sidecar::ADD;
 use crate::outputs::light_map_line;
@@ -23,14 +23,14 @@ const NONE_FITS: &str =
 pub(super) const OUTPUT: &str = "OUTPUT";
 
 /// By how many codes black and white must be nearer to themselves with one pair than with the next for it to be advised alone. Chosen.
-const CLEAR: f64 = 25.0;
+const CLEAR_MARGIN: f64 = 25.0;
 
 /// A model's images of the dark frames, with one pair of ranges.
 #[derive(Debug, Clone)]
 pub(super) struct PairTrial {
     pub(super) ranges: RangePair,
     /// Output of the model for each frame.
-    pub(super) made: Vec<Codes>,
+    pub(super) made: Vec<UnclampedImage>,
     /// Flaw of each output.
     pub(super) verdicts: Vec<Option<Verdict>>,
     /// Output for black and white; `None` if it was not measured.
@@ -38,7 +38,11 @@ pub(super) struct PairTrial {
 }
 
 impl PairTrial {
-    pub(super) fn new(ranges: RangePair, dark: &[Codes], made: Vec<Codes>) -> Self {
+    pub(super) fn new(
+        ranges: RangePair,
+        dark: &[UnclampedImage],
+        made: Vec<UnclampedImage>,
+    ) -> Self {
         let verdicts = dark.iter().zip(&made).map(|(dark, made)| judge(dark, made));
         Self {
             ranges,
@@ -65,7 +69,7 @@ impl PairTrial {
     }
 
     /// The ranges, and what black and white become with them, if it was measured.
-    fn words(&self) -> String {
+    fn description(&self) -> String {
         match self.endpoints {
             None => self.ranges.to_string(),
             Some(Endpoints { black, white, .. }) => format!(
@@ -82,11 +86,12 @@ impl PairTrial {
 
     /// The verdict on the model: the most frequent flaw, if at least half of the frames have one.
     pub(super) fn verdict(&self) -> Option<FlawedFrames> {
-        self.seen().filter(|seen| 2 * seen.flawed >= seen.frames)
+        self.most_frequent_flaw()
+            .filter(|seen| 2 * seen.flawed >= seen.frames)
     }
 
     /// The most frequent flaw, if a frame has one.
-    fn seen(&self) -> Option<FlawedFrames> {
+    fn most_frequent_flaw(&self) -> Option<FlawedFrames> {
         let flawed: Vec<Verdict> = self.verdicts.iter().flatten().copied().collect();
         let half = |count: usize| 2 * count >= self.verdicts.len().max(1);
         let count = |flaw: Flaw| flawed.iter().filter(|one| one.flaw == flaw).count();
@@ -136,19 +141,19 @@ impl fmt::Display for FlawedFrames {
 
 /// Ranges that the user, a preset or the element types state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Ranges {
+pub(super) enum StatedRanges {
     /// Both.
-    Stated,
+    Both,
     /// Range of either the input or the output.
-    OneStated,
+    One,
     /// None.
-    Open,
+    Neither,
 }
 
 /// All that was tried.
 #[derive(Debug, Clone)]
 pub(super) struct Probe {
-    pub(super) ranges: Ranges,
+    pub(super) ranges: StatedRanges,
     /// The ranges that are used if the probe does not decide.
     pub(super) usual: RangePair,
     pub(super) pairs: Vec<PairTrial>,
@@ -187,19 +192,19 @@ impl Probe {
         let advised = self.advised();
         let seen = usual.and_then(|usual| {
             // With a flaw on some frames, other than dim images, it gives way to a pair without any.
-            let mixed = usual.seen().filter(|seen| {
-                let is_open = self.ranges != Ranges::Stated && !advised.is_empty();
+            let mixed = usual.most_frequent_flaw().filter(|seen| {
+                let is_open = self.ranges != StatedRanges::Both && !advised.is_empty();
                 is_open && seen.example.flaw != Flaw::Unlit
             });
             usual.verdict().or(mixed)
         });
         match (self.ranges, seen) {
-            (Ranges::Stated, None) => Conclusion::Plausible,
+            (StatedRanges::Both, None) => Conclusion::Plausible,
             (_, None) => Conclusion::Assumed,
-            (Ranges::Stated, Some(seen)) if seen.gravity == Gravity::Doubtful => {
+            (StatedRanges::Both, Some(seen)) if seen.gravity == Gravity::Doubtful => {
                 Conclusion::Doubtful(seen)
             }
-            (Ranges::Stated, Some(seen)) => Conclusion::Implausible(seen),
+            (StatedRanges::Both, Some(seen)) => Conclusion::Implausible(seen),
             (_, Some(seen)) => match (clear_first(&advised), advised.as_slice()) {
                 (Some(first), _) => Conclusion::Other(first.ranges, seen),
                 (None, []) => Conclusion::Implausible(seen),
@@ -250,7 +255,7 @@ impl Probe {
 
     /// Whether the images in the usual ranges are merely not brighter.
     fn is_dim(&self, seen: &FlawedFrames) -> bool {
-        self.ranges != Ranges::Stated
+        self.ranges != StatedRanges::Both
             && seen.example.flaw == Flaw::Unlit
             && seen.gravity == Gravity::Doubtful
     }
@@ -279,11 +284,14 @@ impl Probe {
             Conclusion::Other(pair, seen) => format!(
                 "{seen}. {}With {} they are plausible; if the model's code uses these, {ADD}: {}",
                 dim(&seen),
-                self.words(pair),
+                self.pair_description(pair),
                 pair.stated()
             ),
             Conclusion::Several(pairs, seen) => {
-                let list: Vec<String> = pairs.iter().map(|pair| self.words(*pair)).collect();
+                let list: Vec<String> = pairs
+                    .iter()
+                    .map(|pair| self.pair_description(*pair))
+                    .collect();
                 format!(
                     "{seen}. {}With other value ranges they are plausible ({}); {ADD} those of the model's code, such as {}",
                     dim(&seen),
@@ -295,21 +303,21 @@ impl Probe {
     }
 
     /// A pair, and what black and white become with it.
-    fn words(&self, ranges: RangePair) -> String {
+    fn pair_description(&self, ranges: RangePair) -> String {
         self.pairs
             .iter()
             .find(|pair| pair.ranges == ranges)
-            .map_or_else(|| ranges.to_string(), PairTrial::words)
+            .map_or_else(|| ranges.to_string(), PairTrial::description)
     }
 
     /// Remedy for a flaw that no other range explains.
     fn remedy(&self, seen: &FlawedFrames) -> String {
         match (seen.example.flaw, self.ranges) {
-            (Flaw::Unlit, Ranges::Open | Ranges::OneStated) => format!(
+            (Flaw::Unlit, StatedRanges::Neither | StatedRanges::One) => format!(
                 "If its images should be this dim, {ADD}: {}",
                 self.usual.stated()
             ),
-            (Flaw::White | Flaw::Haze, Ranges::Open | Ranges::OneStated) => {
+            (Flaw::White | Flaw::Haze, StatedRanges::Neither | StatedRanges::One) => {
                 format!(
                     "{NONE_FITS}; {ADD} `range_in`, `mean`, `std` and `range_out` of the model's code"
                 )
@@ -325,14 +333,14 @@ fn clear_first<'p>(ranked: &[&'p PairTrial]) -> Option<&'p PairTrial> {
         [] => None,
         [only] => Some(only),
         [first, second, ..] => {
-            let is_clear = first.is_near() && first.distance() + CLEAR <= second.distance();
+            let is_clear = first.is_near() && first.distance() + CLEAR_MARGIN <= second.distance();
             is_clear.then_some(*first)
         }
     }
 }
 
 /// Remedy for a flaw that no other range explains.
-fn remedy(flaw: Flaw, ranges: Ranges) -> String {
+fn remedy(flaw: Flaw, ranges: StatedRanges) -> String {
     match (flaw, ranges) {
         (Flaw::Hue, _) => format!(
             "If its output is BGR, {ADD}: `color_out = \"bgr\"` (or \"rgb\", if \"bgr\" is set); if its input is, `color = \"bgr\"` and `color_out = \"rgb\"`"
@@ -347,17 +355,17 @@ fn remedy(flaw: Flaw, ranges: Ranges) -> String {
         (Flaw::Shuffled, _) => format!(
             "Perhaps another output is the image, or the dimensions have another order; {ADD} `output`, `layout_in` or `layout_out`"
         ),
-        (Flaw::Nan, Ranges::Open) => "Check its weights and its divisions by zero".to_owned(),
+        (Flaw::Nan, StatedRanges::Neither) => "Check its weights and its divisions by zero".to_owned(),
         (Flaw::Nan, _) => {
             "Check `range_in` in MODEL.onnx.toml, because values that are too large can cause this; else its weights and its divisions by zero".to_owned()
         }
-        (_, Ranges::Stated) => {
+        (_, StatedRanges::Both) => {
             "Check `range_in`, `range_out` and `output` in MODEL.onnx.toml, and the preset".to_owned()
         }
-        (_, Ranges::OneStated) => {
+        (_, StatedRanges::One) => {
             "One range is set, by MODEL.onnx.toml or the element type, and no other fits it; without a line in that file all are tried".to_owned()
         }
-        (_, Ranges::Open) => format!(
+        (_, StatedRanges::Neither) => format!(
             "{NONE_FITS}; perhaps it needs another `mean` and `std`, another output is the image, or the export has lost its weights"
         ),
     }
@@ -404,7 +412,7 @@ mod tests {
         }
     }
 
-    fn probe(ranges: Ranges, pairs: Vec<PairTrial>) -> Probe {
+    fn probe(ranges: StatedRanges, pairs: Vec<PairTrial>) -> Probe {
         Probe {
             ranges,
             usual: UNIT,
@@ -420,7 +428,7 @@ mod tests {
     fn usual_ranges_are_assumed_if_they_are_plausible() {
         for bytes in [None, FLAT] {
             let usual = probe(
-                Ranges::Open,
+                StatedRanges::Neither,
                 vec![pair(UNIT, &[None; 6]), pair(BYTES, &[bytes; 6])],
             );
             assert_eq!(usual.conclusion(), Conclusion::Assumed);
@@ -431,7 +439,7 @@ mod tests {
     #[test]
     fn another_pair_is_advised_if_the_usual_one_is_implausible() {
         let other = probe(
-            Ranges::Open,
+            StatedRanges::Neither,
             vec![pair(UNIT, &[FLAT; 6]), pair(BYTES, &[None; 6])],
         );
         assert!(matches!(other.conclusion(), Conclusion::Other(BYTES, _)));
@@ -451,13 +459,16 @@ mod tests {
         let mut flaws = [None; 6];
         flaws[2] = WHITE;
         let one_white = vec![pair(UNIT, &flaws), pair(BYTES, &[None; 6])];
-        let other = probe(Ranges::Open, one_white.clone()).conclusion();
+        let other = probe(StatedRanges::Neither, one_white.clone()).conclusion();
         assert!(matches!(other, Conclusion::Other(BYTES, _)), "{other:?}");
-        let alone = probe(Ranges::Open, one_white[..1].to_vec());
+        let alone = probe(StatedRanges::Neither, one_white[..1].to_vec());
         assert_eq!(alone.conclusion(), Conclusion::Assumed);
         flaws[2] = UNLIT;
         let dim = vec![pair(UNIT, &flaws), pair(BYTES, &[None; 6])];
-        assert_eq!(probe(Ranges::Open, dim).conclusion(), Conclusion::Assumed);
+        assert_eq!(
+            probe(StatedRanges::Neither, dim).conclusion(),
+            Conclusion::Assumed
+        );
     }
 
     #[test]
@@ -465,7 +476,7 @@ mod tests {
         let mut flaws = [None; 6];
         flaws[2] = WHITE;
         let dim = probe(
-            Ranges::Open,
+            StatedRanges::Neither,
             vec![pair(UNIT, &[UNLIT; 6]), pair(BYTES, &flaws)],
         );
         let problem = dim.problem().unwrap();
@@ -476,7 +487,7 @@ mod tests {
     #[test]
     fn the_usual_ranges_are_named_first_if_the_images_are_dim() {
         let dim = probe(
-            Ranges::Open,
+            StatedRanges::Neither,
             vec![pair(UNIT, &[UNLIT; 6]), pair(BYTES, &[None; 6])],
         );
         let problem = dim.problem().unwrap();
@@ -496,7 +507,7 @@ mod tests {
                 far(signed, second),
                 far(BYTES, first),
             ];
-            let mut probe = probe(Ranges::Open, pairs);
+            let mut probe = probe(StatedRanges::Neither, pairs);
             probe.rank();
             probe.conclusion()
         };
@@ -518,7 +529,7 @@ mod tests {
         };
         let conclusion = |distance: f64| {
             let mut probe = probe(
-                Ranges::Open,
+                StatedRanges::Neither,
                 vec![pair(UNIT, &[FLAT; 6]), far(clip, distance)],
             );
             probe.rank();
@@ -531,7 +542,7 @@ mod tests {
     #[test]
     fn no_plausible_pair_names_the_flaw_of_the_usual_one() {
         let none = probe(
-            Ranges::Open,
+            StatedRanges::Neither,
             vec![pair(UNIT, &[WHITE; 6]), pair(BYTES, &[FLAT; 6])],
         );
         let Conclusion::Implausible(seen) = none.conclusion() else {
@@ -544,7 +555,7 @@ mod tests {
     fn half_of_the_frames_decide() {
         let flawed = |count: usize| {
             let flaws: Vec<_> = (0..6).map(|i| FLAT.filter(|_| i < count)).collect();
-            probe(Ranges::Stated, vec![pair(UNIT, &flaws)]).conclusion()
+            probe(StatedRanges::Both, vec![pair(UNIT, &flaws)]).conclusion()
         };
         assert_eq!(flawed(2), Conclusion::Plausible);
         assert!(matches!(flawed(3), Conclusion::Implausible(_)));
@@ -552,10 +563,10 @@ mod tests {
 
     #[test]
     fn stated_ranges_may_be_doubtful_but_not_impossible() {
-        let doubtful = probe(Ranges::Stated, vec![pair(UNIT, &[WHITE; 6])]);
+        let doubtful = probe(StatedRanges::Both, vec![pair(UNIT, &[WHITE; 6])]);
         assert!(matches!(doubtful.conclusion(), Conclusion::Doubtful(_)));
         let mixed = probe(
-            Ranges::Stated,
+            StatedRanges::Both,
             vec![pair(UNIT, &[WHITE, WHITE, WHITE, FLAT, FLAT, FLAT])],
         );
         assert!(matches!(mixed.conclusion(), Conclusion::Implausible(_)));

@@ -1,17 +1,17 @@
 //! Running the probe of a model on dark frames: [`Enhancer::probe`].
 
 use super::endpoints::{self, Endpoints, black_and_white};
-use super::findings::warn_of_untried;
-use super::plausible::Codes;
-use super::probe::{Conclusion, OUTPUT, PairTrial, Probe, Ranges};
+use super::findings::warn_not_probed;
+use super::plausible::UnclampedImage;
+use super::probe::{Conclusion, OUTPUT, PairTrial, Probe, StatedRanges};
 use super::range_pair::RangePair;
-use super::trial_images::made;
-use super::usage::{ImageUse, Implausible, Seen, way_out};
+use super::trial_images::run_frames;
+use super::usage::{ImageUse, Implausible, Judgement, doctor_advice};
 use crate::conventions::sidecar::{self, ADD, ModelSidecar};
 use crate::conventions::{Rounding, ValueRange};
 use crate::enhancer::Enhancer;
 use crate::graphs::Graph;
-use crate::outputs::in_expression;
+use crate::outputs::expression_name;
 use crate::planes::Planes;
 use darkqa_ground::error::Result;
 use darkqa_ground::types::manifests::{ProbeNote, ProbeOutcome};
@@ -45,7 +45,7 @@ impl Enhancer {
             probes: [probe], ..
         }) = trials
         else {
-            warn_of_untried(self.name());
+            warn_not_probed(self.name());
             return Ok(());
         };
         let outcome = match probe.conclusion() {
@@ -56,7 +56,7 @@ impl Enhancer {
         let problem = self.problem(&probe, dark)?;
         match (&problem, outcome, implausible) {
             (Some(problem), ProbeOutcome::Overruled, Implausible::Refused) => {
-                return Err(self.fault(format!("{problem}. {}", way_out(self.path()))));
+                return Err(self.error(format!("{problem}. {}", doctor_advice(self.path()))));
             }
             (Some(problem), ..) => tracing::warn!("{}: {problem}", self.name()),
             (None, ..) => {}
@@ -70,9 +70,9 @@ impl Enhancer {
         if let Some(remark) = &no_image {
             self.remark(remark);
         }
-        self.warn_of_remarks();
+        self.log_remarks();
         if probe.conclusion() == Conclusion::Assumed {
-            self.warn_of_assumed(probe.usual, no_image.is_none());
+            self.warn_ranges_assumed(probe.usual, no_image.is_none());
         }
         let note = ProbeNote {
             frames: dark.len(),
@@ -80,7 +80,7 @@ impl Enhancer {
             problem,
             outcome,
         };
-        self.set_probed(note)
+        self.set_probe_result(note)
     }
 
     /// Flaw of a probe's images, with a remedy; `None` if they are plausible. If lines of the sidecar are wrong, the right ones are found
@@ -111,14 +111,17 @@ impl Enhancer {
             .map_or(String::new(), |unread| {
                 format!(". Perhaps another output is needed: {unread}")
             });
-        Ok(Some(sidecar::named(&(problem + &unread), self.path())))
+        Ok(Some(sidecar::insert_sidecar_name(
+            &(problem + &unread),
+            self.path(),
+        )))
     }
 
     /// The output that is read, as a term of a sidecar's expression.
     fn read_output(&self) -> String {
         match &self.graph().convention.image {
             Some(image) => format!("({image})"),
-            None => in_expression(&self.graph().signature.outputs[0].port.name),
+            None => expression_name(&self.graph().signature.outputs[0].port.name),
         }
     }
 
@@ -126,7 +129,7 @@ impl Enhancer {
     ///
     /// # Errors
     /// As by [`Self::enhance`], and if most of its images of dark frames so far are implausible.
-    pub fn enhance_noted(
+    pub fn enhance_and_judge(
         &mut self,
         image: &Rgb,
         place: [&dyn ToString; 2],
@@ -136,7 +139,7 @@ impl Enhancer {
         let enhanced = self.enhance(image)?;
         let used = ImageUse {
             // Looked at in any case: another run may read the image from a store and look for such images.
-            seen: Seen::on([image, &enhanced]),
+            seen: Judgement::on([image, &enhanced]),
             sizes: self.sizes().since(&before),
         };
         self.judge(&used.seen, place, implausible)?;
@@ -147,22 +150,22 @@ impl Enhancer {
     ///
     /// # Errors
     /// If most of its images of dark frames so far are implausible.
-    pub fn note_stored(
+    pub fn judge_stored(
         &self,
         used: &ImageUse,
         place: [&dyn ToString; 2],
         implausible: Implausible,
     ) -> Result<()> {
-        used.note_in(&self.usage(), self.path(), place, implausible)
+        used.record(&self.usage(), self.path(), place, implausible)
     }
 
     fn judge(
         &self,
-        seen: &Seen,
+        seen: &Judgement,
         place: [&dyn ToString; 2],
         implausible: Implausible,
     ) -> Result<()> {
-        seen.judge_in(&self.usage(), self.path(), place, implausible)
+        seen.record(&self.usage(), self.path(), place, implausible)
     }
 
     /// Runs the model on dark frames by each of these conventions, which differ in how the output is read, and with each pair of ranges
@@ -176,9 +179,9 @@ impl Enhancer {
     ) -> Result<Option<Trials<N>>> {
         let usual = self.ranges();
         let ranges = match (input, output) {
-            (Some(_), Some(_)) => Ranges::Stated,
-            (None, None) => Ranges::Open,
-            _ => Ranges::OneStated,
+            (Some(_), Some(_)) => StatedRanges::Both,
+            (None, None) => StatedRanges::Neither,
+            _ => StatedRanges::One,
         };
         for size in SIZES {
             let frames: Vec<Rgb> = dark
@@ -234,7 +237,7 @@ impl Enhancer {
         conventions: [&ModelSidecar; N],
         ranges: &[RangePair],
     ) -> Result<Option<[Vec<PairTrial>; N]>> {
-        let seen: Vec<Codes> = frames.iter().map(Codes::from_rgb).collect();
+        let seen: Vec<UnclampedImage> = frames.iter().map(UnclampedImage::from_rgb).collect();
         let mut pairs = [(); N].map(|()| Vec::new());
         for fed_alike in ranges.chunk_by(|a, b| a.input == b.input) {
             let graphs: Vec<Graph> = conventions
@@ -245,7 +248,7 @@ impl Enhancer {
                         .map(|ranges| self.read_by(convention, *ranges))
                 })
                 .collect::<Result<_>>()?;
-            let Some(made) = made(&graphs, frames)? else {
+            let Some(made) = run_frames(&graphs, frames)? else {
                 return Ok(None);
             };
             let mut made = made.into_iter();
@@ -269,7 +272,7 @@ impl Enhancer {
     }
 
     /// Warns that nothing states the value ranges. Lines that confirm them are proposed if the output seems to be the image.
-    fn warn_of_assumed(&self, usual: RangePair, is_image: bool) {
+    fn warn_ranges_assumed(&self, usual: RangePair, is_image: bool) {
         let lines = if is_image {
             format!(". To confirm, {ADD}: {}", usual.stated())
         } else {
@@ -278,7 +281,7 @@ impl Enhancer {
         let words = format!(
             "value ranges of {usual} assumed, because nothing sets them; its images of dark frames are plausible{lines}"
         );
-        let words = sidecar::named(&words, self.path());
+        let words = sidecar::insert_sidecar_name(&words, self.path());
         tracing::warn!("{}: {words}", self.name());
     }
 
@@ -294,7 +297,7 @@ impl Enhancer {
     ) -> Result<Option<Endpoints>> {
         let graph = self.read_by(convention, ranges)?;
         let image = black_and_white(self.probe_size(endpoints::SIZE));
-        let made = made(&[graph], &[image])?;
+        let made = run_frames(&[graph], &[image])?;
         let codes = made.into_iter().flatten().flatten().next();
         let endpoints = codes.as_ref().map(Endpoints::from_codes);
         Ok(endpoints.filter(|endpoints| endpoints.distance.is_finite()))
@@ -302,9 +305,12 @@ impl Enhancer {
 
     /// The model, fed and read by a convention with these ranges.
     pub(super) fn read_by(&self, convention: &ModelSidecar, ranges: RangePair) -> Result<Graph> {
-        let convention = convention.clone().fed(ranges.input).read(ranges.output);
+        let convention = convention
+            .clone()
+            .with_input_scale(ranges.input)
+            .with_output_scale(ranges.output);
         let graph = self.graph().with_convention(convention);
-        graph.map_err(|problem| self.fault(problem))
+        graph.map_err(|problem| self.error(problem))
     }
 
     /// A frame in a size of the probe, or in the size that the graph fixes.
@@ -316,9 +322,9 @@ impl Enhancer {
         };
         let [height, width] = self.probe_size(size);
         let planes = Planes::from_rgb(frame).resized(height, width);
-        let planes = planes.map_err(|problem| self.fault(problem))?;
+        let planes = planes.map_err(|problem| self.error(problem))?;
         planes
             .to_rgb(Rounding::Round)
-            .ok_or_else(|| self.fault("a frame of the probe has no pixel"))
+            .ok_or_else(|| self.error("a frame of the probe has no pixel"))
     }
 }

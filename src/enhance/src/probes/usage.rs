@@ -7,15 +7,15 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use serde::{Deserialize, Serialize};
 
-use super::plausible::{Codes, DARK, Gravity, Verdict, brightness, judge};
+use super::plausible::{DARK, Gravity, UnclampedImage, Verdict, brightness, judge};
 use darkqa_ground::error::{Error, Result};
 use darkqa_ground::types::manifests::{ConventionLine, ELSEWHERE, EnhancerNote, FlawedImage};
 use darkqa_ground::types::{Digest, Rgb, SizeLog};
 
 /// Number of dark images from which on a verdict on the enhancer is possible; chosen as the number of frames of the probe.
-const ENOUGH: usize = super::probe::FRAMES;
+const MIN_JUDGED: usize = super::probe::FRAMES;
 /// Number of the twin that stands for images that were read from a store.
-const STORED: usize = usize::MAX;
+const STORED_TWIN: usize = usize::MAX;
 
 /// Reaction to a model with implausible images.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -31,7 +31,7 @@ pub enum Implausible {
 
 /// Finding about one enhanced image.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub(super) enum Seen {
+pub(super) enum Judgement {
     /// It was not looked at, because the degraded image is not dark: good models fail the rules on those.
     #[default]
     Bright,
@@ -39,13 +39,16 @@ pub(super) enum Seen {
     Dark(Option<Verdict>),
 }
 
-impl Seen {
+impl Judgement {
     /// Compares the enhanced image with the degraded one.
     pub(super) fn on([degraded, made]: [&Rgb; 2]) -> Self {
         if brightness(degraded) > DARK {
             Self::Bright
         } else {
-            Self::Dark(judge(&Codes::small(degraded), &Codes::small(made)))
+            Self::Dark(judge(
+                &UnclampedImage::downscaled(degraded),
+                &UnclampedImage::downscaled(made),
+            ))
         }
     }
 }
@@ -53,7 +56,7 @@ impl Seen {
 /// Contribution of one image to the enhancer's note; stored with the image.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ImageUse {
-    pub(super) seen: Seen,
+    pub(super) seen: Judgement,
     /// How the size of the image was handled.
     pub(super) sizes: SizeLog,
 }
@@ -63,7 +66,7 @@ impl ImageUse {
     ///
     /// # Errors
     /// If most of its images of dark frames so far are implausible.
-    pub fn note_in(
+    pub fn record(
         &self,
         usage: &Usage,
         model: &Path,
@@ -71,16 +74,16 @@ impl ImageUse {
         implausible: Implausible,
     ) -> Result<()> {
         usage.add_sizes_of_stored(&self.sizes);
-        self.seen.judge_in(usage, model, place, implausible)
+        self.seen.record(usage, model, place, implausible)
     }
 }
 
 impl ImageUse {
     /// The use of an image that was enhanced elsewhere, made of a degraded one.
     #[must_use]
-    pub fn made_elsewhere([degraded, made]: [&Rgb; 2]) -> Self {
+    pub fn for_external([degraded, made]: [&Rgb; 2]) -> Self {
         Self {
-            seen: Seen::on([degraded, made]),
+            seen: Judgement::on([degraded, made]),
             sizes: SizeLog::default(),
         }
     }
@@ -89,7 +92,7 @@ impl ImageUse {
     ///
     /// # Errors
     /// If most images of dark frames so far are implausible; names the folder.
-    pub fn note_made_elsewhere(
+    pub fn record_external(
         &self,
         usage: &Usage,
         folder: &Path,
@@ -104,12 +107,12 @@ impl ImageUse {
     }
 }
 
-impl Seen {
+impl Judgement {
     /// Counts the finding about a frame's image in a condition, unless images are not checked. The model is named by its file.
     ///
     /// # Errors
     /// If most images of dark frames so far are implausible.
-    pub(super) fn judge_in(
+    pub(super) fn record(
         &self,
         usage: &Usage,
         model: &Path,
@@ -119,13 +122,13 @@ impl Seen {
         let judged = usage.judge(self, place, implausible);
         judged.map_err(|problem| Error::EnhancerEnded {
             path: model.to_owned(),
-            problem: format!("{problem}. {}", way_out(model)),
+            problem: format!("{problem}. {}", doctor_advice(model)),
         })
     }
 }
 
 /// What to do about an enhancer whose images are implausible, as a sentence.
-pub(super) fn way_out(model: &Path) -> String {
+pub(super) fn doctor_advice(model: &Path) -> String {
     format!(
         "`darkqa-eval enhance doctor {} IMAGES… --out DIR` tries each value range and colour order; --allow bad-enhancer uses it anyway",
         model.display()
@@ -150,7 +153,7 @@ struct UsageState {
 impl Usage {
     /// The handle of images that were enhanced elsewhere.
     #[must_use]
-    pub fn made_elsewhere() -> Self {
+    pub fn for_external() -> Self {
         let usage = Self::default();
         usage.update(|note| {
             note.convention.push(ConventionLine {
@@ -185,12 +188,12 @@ impl Usage {
 
     /// Adds the size adaptations of an image that was made earlier and is read now.
     pub(super) fn add_sizes_of_stored(&self, log: &SizeLog) {
-        self.change_sizes(STORED, |sizes| sizes.add(log));
+        self.change_sizes(STORED_TWIN, |sizes| sizes.add(log));
     }
 
     /// Resets the size adaptations of stored images.
-    pub(crate) fn count_stored_anew(&self) {
-        self.set_sizes(STORED, &SizeLog::default());
+    pub(crate) fn reset_stored_counts(&self) {
+        self.set_sizes(STORED_TWIN, &SizeLog::default());
     }
 
     /// Changes the note.
@@ -204,11 +207,11 @@ impl Usage {
     /// The finding, if more than half of at least six images are implausible, unless such images are used.
     pub(super) fn judge(
         &self,
-        seen: &Seen,
+        seen: &Judgement,
         [frame, condition]: [&dyn ToString; 2],
         implausible: Implausible,
     ) -> Result<(), String> {
-        let &Seen::Dark(verdict) = seen else {
+        let &Judgement::Dark(verdict) = seen else {
             return Ok(());
         };
         if implausible == Implausible::NotLookedFor {
@@ -232,7 +235,7 @@ impl Usage {
             let judged = state.note.judged.images;
             match (impossible, implausible) {
                 (Some(example), Implausible::Refused)
-                    if judged >= ENOUGH && 2 * state.impossible > judged =>
+                    if judged >= MIN_JUDGED && 2 * state.impossible > judged =>
                 {
                     Err(format!(
                         "{} of its {judged} images of dark frames are implausible; they {example}",
@@ -263,7 +266,11 @@ mod tests {
     }
 
     fn judged(usage: &Usage, frame: usize, made: &Rgb, how: Implausible) -> Result<(), String> {
-        usage.judge(&Seen::on([&squares(1.0), made]), [&frame, &"L3+ev+m"], how)
+        usage.judge(
+            &Judgement::on([&squares(1.0), made]),
+            [&frame, &"L3+ev+m"],
+            how,
+        )
     }
 
     #[test]
@@ -289,7 +296,7 @@ mod tests {
         for frame in [0, 1, 0, 1, 1] {
             judged(&usage, frame, &flat, Implausible::Used).unwrap();
         }
-        let again = Seen::on([&squares(1.0), &flat]);
+        let again = Judgement::on([&squares(1.0), &flat]);
         usage
             .judge(&again, [&0, &"L4+ev+m"], Implausible::Used)
             .unwrap();
@@ -303,8 +310,8 @@ mod tests {
         let usage = Usage::default();
         let bright = squares(6.0);
         let made = Rgb::black(96, 96);
-        let seen = Seen::on([&bright, &made]);
-        assert_eq!(seen, Seen::Bright);
+        let seen = Judgement::on([&bright, &made]);
+        assert_eq!(seen, Judgement::Bright);
         usage
             .judge(&seen, [&"frame", &"L0"], Implausible::Refused)
             .unwrap();

@@ -6,7 +6,7 @@
 
 use super::size_plan::SizeRule;
 use super::texture::{CODES, texture};
-use crate::conventions::Tile;
+use crate::conventions::Locality;
 use crate::graphs::{Graph, RunResult};
 use crate::planes::Planes;
 use darkqa_ground::error;
@@ -14,10 +14,10 @@ use darkqa_ground::types::Rgb;
 
 /// Difference of an output of 0..1 that counts as movement; above the last bits of 32-bit floats, below a thousandth of a
 /// code. Chosen.
-const MOVED: f32 = 1e-6;
+const MIN_CHANGE: f32 = 1e-6;
 
 /// Least context of a tile, in pixels, where a tile has room for it: some pixels more than most models need. Chosen.
-const LEAST_CONTEXT: usize = 8;
+const MIN_CONTEXT: usize = 8;
 
 /// Side of the trial image where the model takes any, in pixels; chosen.
 pub(crate) const FREE_SIDE: usize = 128;
@@ -26,7 +26,7 @@ pub(crate) const FREE_SIDE: usize = 128;
 const ALIGNMENTS: [usize; 16] = [1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24, 28, 32];
 
 /// Largest difference of outputs of 0..1 that count as the same; a tenth of a code. Chosen: above the rounding of other sums.
-const SAME: f32 = 4e-4;
+const MAX_EQUAL: f32 = 4e-4;
 
 /// Context and alignment of the tiles of a model, measured once if nothing states them.
 #[derive(Debug, Clone, Default)]
@@ -44,8 +44,8 @@ impl Context {
         rule: SizeRule,
     ) -> error::Result<Result<usize, String>> {
         match rule.tile {
-            Some(Tile::Exact(context)) => return Ok(Ok(context)),
-            Some(Tile::None) => {
+            Some(Locality::Exact(context)) => return Ok(Ok(context)),
+            Some(Locality::Global) => {
                 return Ok(Err(
                     "it needs the whole image (tile = \"none\" in MODEL.onnx.toml or the preset)"
                         .to_owned(),
@@ -53,7 +53,7 @@ impl Context {
             }
             None => {}
         }
-        let size = rule.whole([FREE_SIDE; 2]);
+        let size = rule.run_size([FREE_SIDE; 2]);
         if self.reach.is_none() {
             self.reach = Some(Reach::probe(graph, size)?);
             graph.restart_clock();
@@ -76,13 +76,13 @@ impl Context {
     }
 
     /// Whether the alignment was not measured yet.
-    pub(crate) fn is_unaligned(&self) -> bool {
+    pub(crate) fn lacks_alignment(&self) -> bool {
         self.alignment.is_none()
     }
 
     /// Multiple at which tiles of this height and width must start to equal the whole image: 2 to the power of the number of poolings. 1 if
     /// none is found; the comparison of seams then decides.
-    pub(crate) fn alignment(
+    pub(crate) fn measure_alignment(
         &mut self,
         graph: &Graph,
         tile: [usize; 2],
@@ -91,7 +91,7 @@ impl Context {
         if let Some(alignment) = self.alignment {
             return Ok(alignment);
         }
-        let found = alignment(graph, tile, context)?.unwrap_or(1);
+        let found = find_alignment(graph, tile, context)?.unwrap_or(1);
         graph.restart_clock();
         self.alignment = Some(found);
         Ok(found)
@@ -100,14 +100,14 @@ impl Context {
 
 /// The smallest of [`ALIGNMENTS`] by which an image may be moved without a change of the result, farther than the context from its
 /// edges; `None` if there is none.
-fn alignment(graph: &Graph, tile: [usize; 2], context: usize) -> error::Result<Option<usize>> {
+fn find_alignment(graph: &Graph, tile: [usize; 2], context: usize) -> error::Result<Option<usize>> {
     let largest = ALIGNMENTS[ALIGNMENTS.len() - 1];
     let scene = texture(tile.map(|side| side + largest), &CODES[0]);
-    let Ok(still) = output(graph, &part(&scene, tile, 0))? else {
+    let Ok(still) = run_trial(graph, &crop(&scene, tile, 0))? else {
         return Ok(None);
     };
     for shift in ALIGNMENTS {
-        let Ok(moved) = output(graph, &part(&scene, tile, shift))? else {
+        let Ok(moved) = run_trial(graph, &crop(&scene, tile, shift))? else {
             return Ok(None);
         };
         if same_interior(&still, &moved, shift, context) {
@@ -118,7 +118,7 @@ fn alignment(graph: &Graph, tile: [usize; 2], context: usize) -> error::Result<O
 }
 
 /// The part of an image that begins at this row and column.
-fn part(scene: &Rgb, [height, width]: [usize; 2], start: usize) -> Planes {
+fn crop(scene: &Rgb, [height, width]: [usize; 2], start: usize) -> Planes {
     let mut part = Rgb::black(height, width);
     let rows = scene.samples().chunks_exact(3 * scene.width()).skip(start);
     let lines = part.samples_mut().chunks_exact_mut(3 * width);
@@ -143,7 +143,7 @@ fn same_interior(still: &Planes, moved: &Planes, shift: usize, margin: usize) ->
                     let at = |row: usize, column: usize| channel * plane + row * width + column;
                     let was = still.samples[at(row + shift, column + shift)];
                     let is = moved.samples[at(row, column)];
-                    (was - is).abs() <= SAME
+                    (was - is).abs() <= MAX_EQUAL
                 })
             })
         })
@@ -159,7 +159,7 @@ impl Reach {
         let mut farthest = 0;
         for codes in &CODES {
             let mut image = texture(size, codes);
-            let before = match output(graph, &Planes::from_rgb(&image))? {
+            let before = match run_trial(graph, &Planes::from_rgb(&image))? {
                 Ok(before) => before,
                 Err(problem) => return Ok(Err(problem)),
             };
@@ -168,12 +168,12 @@ impl Reach {
             for sample in &mut image.samples_mut()[at..at + 3] {
                 *sample += 1;
             }
-            let after = match output(graph, &Planes::from_rgb(&image))? {
+            let after = match run_trial(graph, &Planes::from_rgb(&image))? {
                 Ok(after) => after,
                 Err(problem) => return Ok(Err(problem)),
             };
             let corner = Planes::from_rgb(&with_inverted_corner(&image, middle));
-            let corner = match output(graph, &corner)? {
+            let corner = match run_trial(graph, &corner)? {
                 Ok(corner) => corner,
                 Err(problem) => return Ok(Err(problem)),
             };
@@ -188,21 +188,21 @@ impl Reach {
     /// model counts as global.
     fn context(self, tile: [usize; 2]) -> Option<usize> {
         let quarter = tile[0].min(tile[1]) / 4;
-        (self.0 <= quarter).then(|| self.0.max(LEAST_CONTEXT.min(quarter)))
+        (self.0 <= quarter).then(|| self.0.max(MIN_CONTEXT.min(quarter)))
     }
 }
 
 /// Output of a trial; the inner error explains why it failed.
-fn output(graph: &Graph, planes: &Planes) -> error::Result<Result<Planes, String>> {
+fn run_trial(graph: &Graph, planes: &Planes) -> error::Result<Result<Planes, String>> {
     graph.restart_clock();
     let unmeasured = |why: &str| {
         Err(format!(
             "the context that a pixel needs cannot be measured: the model {why}"
         ))
     };
-    Ok(match graph.planes(planes)? {
+    Ok(match graph.run_planes(planes)? {
         RunResult::Output(planes) => Ok(planes),
-        RunResult::Failed(failure) => unmeasured(&failure.words()),
+        RunResult::Failed(failure) => unmeasured(&failure.message()),
         RunResult::Unusable(_) => unmeasured("gave values outside its range"),
     })
 }
@@ -220,7 +220,7 @@ fn with_inverted_corner(image: &Rgb, [top, left]: [usize; 2]) -> Rgb {
 
 /// Distance, along a side, of the farthest sample that differs from `middle`.
 fn farthest_moved(before: &Planes, after: &Planes, middle: [usize; 2]) -> usize {
-    moved(before, after, MOVED)
+    changed_pixels(before, after, MIN_CHANGE)
         .map(|[y, x]| y.abs_diff(middle[0]).max(x.abs_diff(middle[1])))
         .max()
         .unwrap_or(0)
@@ -228,7 +228,7 @@ fn farthest_moved(before: &Planes, after: &Planes, middle: [usize; 2]) -> usize 
 
 /// Distance, along a side, of the farthest sample that differs from the rows and columns from `corner` on; 0 if all are in them.
 fn farthest_from_corner(before: &Planes, after: &Planes, corner: [usize; 2]) -> usize {
-    moved(before, after, SAME)
+    changed_pixels(before, after, MAX_EQUAL)
         .map(|[y, x]| {
             let above = corner[0].saturating_sub(y);
             above.max(corner[1].saturating_sub(x))
@@ -238,7 +238,7 @@ fn farthest_from_corner(before: &Planes, after: &Planes, corner: [usize; 2]) -> 
 }
 
 /// Rows and columns of the samples that differ by more than `limit`; two NaNs do not differ.
-fn moved<'a>(
+fn changed_pixels<'a>(
     before: &'a Planes,
     after: &'a Planes,
     limit: f32,

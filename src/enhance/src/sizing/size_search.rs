@@ -3,7 +3,7 @@
 use super::texture::{CODES, texture};
 use super::tiles::TileWindow;
 use crate::conventions::sidecar::ADD;
-use crate::failure::{RunFailure, by};
+use crate::failure::{RunFailure, format_size};
 use crate::graphs::{Graph, RunResult};
 use darkqa_ground::error::Result;
 
@@ -13,27 +13,27 @@ pub(crate) const MULTIPLES: [usize; 17] = [
 ];
 
 /// Least side of a trial image, in pixels; chosen: enough for networks that halve the image five times.
-const LEAST_SIDE: usize = 64;
+const MIN_SIDE: usize = 64;
 
 /// Sizes that a model takes, found by trial.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum TakenSizes {
+pub(crate) enum AcceptedSizes {
     /// Sides of multiples of this number, above 1.
     Multiple(usize),
     /// One height and width alone, frozen by tracing.
     Traced([usize; 2]),
 }
 
-impl TakenSizes {
+impl AcceptedSizes {
     /// The finding, with the sidecar line that states it.
-    pub(crate) fn words(self) -> String {
+    pub(crate) fn message(self) -> String {
         match self {
             Self::Multiple(multiple) => format!(
                 "it takes only sides that are multiples of {multiple} pixels (found by trial), so other images are padded; to confirm, {ADD}: `multiple = {multiple}`"
             ),
             Self::Traced(size) => format!(
                 "it was traced for {} and takes no other size, so other images are padded or tiled; export it without int(x.shape[..]) in its code, or {ADD}: `fixed = [{}, {}]`",
-                by(size),
+                format_size(size),
                 size[1],
                 size[0]
             ),
@@ -56,7 +56,7 @@ enum SearchState {
     Open,
     /// It found nothing, or that the model takes any size of that order.
     Nothing,
-    Found(TakenSizes),
+    Found(AcceptedSizes),
 }
 
 impl SizeSearch {
@@ -69,7 +69,7 @@ impl SizeSearch {
     }
 
     /// Result of the search; `None` before it was made or if it found nothing.
-    pub(crate) fn found(&self) -> Option<TakenSizes> {
+    pub(crate) fn found(&self) -> Option<AcceptedSizes> {
         match self.state {
             SearchState::Found(found) => Some(found),
             SearchState::Open | SearchState::Nothing => None,
@@ -77,12 +77,12 @@ impl SizeSearch {
     }
 
     /// Searches at the first call, and returns the result.
-    pub(crate) fn run(&mut self, graph: &Graph) -> Result<Option<TakenSizes>> {
+    pub(crate) fn run(&mut self, graph: &Graph) -> Result<Option<AcceptedSizes>> {
         if self.state == SearchState::Open {
-            let found = match multiple(graph)? {
+            let found = match find_multiple(graph)? {
                 Some(1) => None,
-                Some(multiple) => Some(TakenSizes::Multiple(multiple)),
-                None => self.traced_size(graph)?.map(TakenSizes::Traced),
+                Some(multiple) => Some(AcceptedSizes::Multiple(multiple)),
+                None => self.find_traced_size(graph)?.map(AcceptedSizes::Traced),
             };
             self.state = found.map_or(SearchState::Nothing, SearchState::Found);
         }
@@ -90,12 +90,12 @@ impl SizeSearch {
     }
 
     /// The first of the traced sizes at which the model runs.
-    fn traced_size(&self, graph: &Graph) -> Result<Option<[usize; 2]>> {
+    fn find_traced_size(&self, graph: &Graph) -> Result<Option<[usize; 2]>> {
         for size in &self.traced {
-            match trial(graph, *size)? {
-                Trial::Runs => return Ok(Some(*size)),
-                Trial::Fails => {}
-                Trial::Ended => return Ok(None),
+            match run_trial(graph, *size)? {
+                TrialOutcome::Runs => return Ok(Some(*size)),
+                TrialOutcome::Fails => {}
+                TrialOutcome::OverLimit => return Ok(None),
             }
         }
         Ok(None)
@@ -105,12 +105,12 @@ impl SizeSearch {
 /// The smallest of [`MULTIPLES`] that the model needs the sides of images to be multiples of; `None` if none of them suits.
 ///
 /// A multiple is tried at a size that is not a multiple of any larger one, so that a success is evidence for this one.
-fn multiple(graph: &Graph) -> Result<Option<usize>> {
+fn find_multiple(graph: &Graph) -> Result<Option<usize>> {
     for multiple in MULTIPLES {
-        match trial(graph, trial_size(multiple))? {
-            Trial::Runs => return Ok(Some(multiple)),
-            Trial::Fails => {}
-            Trial::Ended => return Ok(None),
+        match run_trial(graph, trial_size(multiple))? {
+            TrialOutcome::Runs => return Ok(Some(multiple)),
+            TrialOutcome::Fails => {}
+            TrialOutcome::OverLimit => return Ok(None),
         }
     }
     Ok(None)
@@ -120,34 +120,36 @@ fn multiple(graph: &Graph) -> Result<Option<usize>> {
 fn trial_size(multiple: usize) -> [usize; 2] {
     let mut primes = (3..)
         .filter(|n: &usize| (2..*n).all(|divisor| !n.is_multiple_of(divisor)))
-        .skip_while(|n| n * multiple < LEAST_SIDE);
+        .skip_while(|n| n * multiple < MIN_SIDE);
     [(); 2].map(|()| primes.next().map_or(multiple, |prime| prime * multiple))
 }
 
 /// Result of a trial.
-enum Trial {
+enum TrialOutcome {
     /// The model gave an image of the input's size, whatever its values.
     Runs,
     Fails,
     /// It took more time or memory than an image may, so that no further trial makes sense.
-    Ended,
+    OverLimit,
 }
 
-fn trial(graph: &Graph, size: [usize; 2]) -> Result<Trial> {
+fn run_trial(graph: &Graph, size: [usize; 2]) -> Result<TrialOutcome> {
     let window = TileWindow::whole(size);
     graph.restart_clock();
     let result = graph.probe(&texture(size, &CODES[1]), window)?;
     Ok(match result {
-        RunResult::Output(()) | RunResult::Unusable(_) => Trial::Runs,
-        RunResult::Failed(RunFailure::TooLong(_) | RunFailure::TooLarge(_)) => Trial::Ended,
-        RunResult::Failed(_) => Trial::Fails,
+        RunResult::Output(()) | RunResult::Unusable(_) => TrialOutcome::Runs,
+        RunResult::Failed(RunFailure::TimedOut(_) | RunFailure::MemoryExceeded(_)) => {
+            TrialOutcome::OverLimit
+        }
+        RunResult::Failed(_) => TrialOutcome::Fails,
     })
 }
 
 /// Message for a model whose sizes were not found, after `failure`.
-pub(crate) fn not_found(failure: &RunFailure, search: &SizeSearch) -> String {
-    let words = failure.words();
-    if !failure.is_of_size() {
+pub(crate) fn sizes_not_found(failure: &RunFailure, search: &SizeSearch) -> String {
+    let words = failure.message();
+    if !failure.may_depend_on_size() {
         return words;
     }
     let traced = if search.traced.is_empty() {
@@ -175,7 +177,7 @@ mod tests {
             let size = trial_size(multiple);
             assert!(
                 size.iter()
-                    .all(|side| *side >= LEAST_SIDE && side % multiple == 0)
+                    .all(|side| *side >= MIN_SIDE && side % multiple == 0)
             );
             for larger in &MULTIPLES[index + 1..] {
                 let fits = size.iter().all(|side| side % larger == 0);

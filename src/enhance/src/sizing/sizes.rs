@@ -25,17 +25,17 @@ pub(crate) fn count_planned(
     seam: Seam,
 ) {
     count_image(log, rule);
-    let (is_padded, is_tiled) = (plan.cut.area != size, plan.tiles.count() > 1);
+    let (is_padded, is_tiled) = (plan.geometry.area != size, plan.tiles.count() > 1);
     log.whole += usize::from(!is_padded && !is_tiled);
     if is_padded {
         log.padded += 1;
         log.pad = Some(rule.pad.to_string());
     }
     if is_tiled {
-        let [height, width] = plan.fed();
+        let [height, width] = plan.run_size();
         log.tiled += 1;
         log.tile = log.tile.max(Some([width, height]));
-        log.context = log.context.max(Some(plan.cut.context));
+        log.context = log.context.max(Some(plan.geometry.context));
         log.seam.compared += seam.compared;
         log.seam.black += seam.black;
         log.seam.differing += seam.differing;

@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 
 use darkqa_ground::types::Rgb;
 
-/// Codes of the trial images: one as dark as an underexposed photograph, one with the whole range, and one nearly black, for gates that
+/// UnclampedImage of the trial images: one as dark as an underexposed photograph, one with the whole range, and one nearly black, for gates that
 /// brighter images saturate. Black is left out, as some models divide by it.
 pub(crate) const CODES: [RangeInclusive<u8>; 3] = [4..=40, 4..=251, 1..=12];
 

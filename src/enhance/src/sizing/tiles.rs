@@ -90,7 +90,7 @@ pub(crate) struct TileSpan {
 
 impl TileWindow {
     /// Part of the image that the model gets for a tile.
-    pub(crate) fn input_of(row: TileSpan, column: TileSpan) -> Self {
+    pub(crate) fn for_input(row: TileSpan, column: TileSpan) -> Self {
         Self {
             left: column.input_start,
             top: row.input_start,
@@ -100,7 +100,7 @@ impl TileWindow {
     }
 
     /// Part of a tile's output that is used, relative to its input.
-    pub(crate) fn output_of(row: TileSpan, column: TileSpan) -> Self {
+    pub(crate) fn for_output(row: TileSpan, column: TileSpan) -> Self {
         Self {
             left: column.output_start - column.input_start,
             top: row.output_start - row.input_start,
@@ -119,7 +119,7 @@ pub(crate) struct TilePlan {
 
 /// Area, size and context of tiles, in pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Cutting {
+pub(crate) struct TileGeometry {
     /// Height and width of the area that the tiles cover.
     pub(crate) area: [usize; 2],
     /// Largest height and width of a tile, context included.
@@ -132,8 +132,15 @@ pub(crate) struct Cutting {
 
 impl TilePlan {
     /// The tiles of an area; `None` if a tile is not larger than its context.
-    pub(super) fn new(cut: Cutting) -> Option<Self> {
-        let spans = |side: usize| spans(cut.area[side], cut.tile[side], cut.context, cut.multiple);
+    pub(super) fn new(geometry: TileGeometry) -> Option<Self> {
+        let spans = |side: usize| {
+            spans(
+                geometry.area[side],
+                geometry.tile[side],
+                geometry.context,
+                geometry.multiple,
+            )
+        };
         Some(Self {
             rows: spans(0)?,
             columns: spans(1)?,
@@ -205,7 +212,7 @@ pub(crate) struct Seam {
 impl Seam {
     /// Whether the tiles agree with the whole image: the same bytes, except at most one in a thousand that differs by one
     /// code, because of the last bit of a float.
-    pub(crate) fn holds(self) -> bool {
+    pub(crate) fn agrees(self) -> bool {
         self.max_difference <= 1 && self.differing * 1000 <= self.compared
     }
 }
@@ -297,13 +304,13 @@ mod tests {
 
     #[test]
     fn seams_are_compared() {
-        let cut = Cutting {
+        let geometry = TileGeometry {
             area: [37, 50],
             tile: [20, 20],
             context: 3,
             multiple: 1,
         };
-        let plan = TilePlan::new(cut).unwrap();
+        let plan = TilePlan::new(geometry).unwrap();
         // An image tile by tile; with a shift, pixels depend on the tile's position, so that seams differ.
         let tiled = |shift: usize| {
             let mut canvas = TiledImage::new([37, 50]);
@@ -325,8 +332,8 @@ mod tests {
         let (image, seam) = tiled(0);
         let expected = (0..37 * 50).flat_map(|i| [(i / 50 * 5 + i % 50 * 3) as u8; 3]);
         assert!(image.samples().iter().copied().eq(expected));
-        assert!(seam.holds() && seam.compared > 1000 && seam.max_difference == 0);
+        assert!(seam.agrees() && seam.compared > 1000 && seam.max_difference == 0);
         let (_, seam) = tiled(1);
-        assert!(!seam.holds() && seam.max_difference > 1, "{seam:?}");
+        assert!(!seam.agrees() && seam.max_difference > 1, "{seam:?}");
     }
 }

@@ -1,7 +1,7 @@
 use super::*;
 
 /// A dark image with structure and colour, in codes: squares of different light on a ramp, most of them warm, some blue.
-fn dark() -> Codes {
+fn dark() -> UnclampedImage {
     let (height, width) = (96_u32, 144_u32);
     let pixels = (0..height).flat_map(|y| {
         (0..width).map(move |x| {
@@ -13,26 +13,26 @@ fn dark() -> Codes {
             }
         })
     });
-    Codes {
+    UnclampedImage {
         height: height as usize,
         width: width as usize,
         samples: pixels.flatten().map(f32::round).collect(),
     }
 }
 
-fn each(codes: &Codes, change: impl Fn(f32) -> f32) -> Codes {
-    Codes {
+fn each(codes: &UnclampedImage, change: impl Fn(f32) -> f32) -> UnclampedImage {
+    UnclampedImage {
         samples: codes.samples.iter().map(|code| change(*code)).collect(),
         ..codes.clone()
     }
 }
 
 /// Output of a good enhancer: four times the light.
-fn good() -> Codes {
+fn good() -> UnclampedImage {
     each(&dark(), |code| 4.0 * code)
 }
 
-fn flaw(made: &Codes) -> Option<Flaw> {
+fn flaw(made: &UnclampedImage) -> Option<Flaw> {
     judge(&dark(), made).map(|verdict| verdict.flaw)
 }
 
@@ -66,7 +66,7 @@ fn each_wrong_reading_has_its_flaw() {
     let relabelled = {
         // Planes read as packed pixels.
         let planes = (0..3).flat_map(|channel| good.samples.iter().skip(channel).step_by(3));
-        Codes {
+        UnclampedImage {
             samples: planes.copied().collect(),
             ..good.clone()
         }
@@ -112,7 +112,7 @@ fn a_pale_room_is_no_haze() {
 
 #[test]
 fn a_black_output_is_impossible_and_a_denoised_one_doubtful() {
-    let gravity = |made: &Codes| judge(&dark(), made).unwrap().gravity;
+    let gravity = |made: &UnclampedImage| judge(&dark(), made).unwrap().gravity;
     assert_eq!(
         gravity(&each(&dark(), |code| 0.4 * code)),
         Gravity::Impossible
@@ -126,7 +126,7 @@ fn a_black_output_is_impossible_and_a_denoised_one_doubtful() {
 #[test]
 fn images_smaller_than_a_block_are_judged_too() {
     for (height, width) in [(1, 1), (3, 200), (200, 3), (4, 4)] {
-        let image = Codes {
+        let image = UnclampedImage {
             height,
             width,
             samples: vec![3.0; height * width * 3],

@@ -1,9 +1,9 @@
 use super::*;
 use crate::conventions::{Channels, Padding};
-use crate::inputs::{DarkImage, FedImage, Feeding, Tensor, TensorData};
+use crate::inputs::{DarkImage, FedImage, InputEncoding, Tensor, TensorData};
 use darkqa_ground::types::Rgb;
 
-const FEEDING: Feeding = Feeding {
+const ENCODING: InputEncoding = InputEncoding {
     layout: TensorLayout::Nchw,
     element: ElementType::Float32,
     channels: Channels::Rgb,
@@ -14,8 +14,8 @@ const FEEDING: Feeding = Feeding {
     std: [1.0; 3],
     pad: Padding::Reflect,
 };
-fn reading() -> OutputReading {
-    OutputReading {
+fn decoding() -> OutputDecoding {
+    OutputDecoding {
         layout: None,
         preferred: TensorLayout::Nchw,
         channels: vec![3],
@@ -47,14 +47,14 @@ fn near(a: &TensorData, b: &TensorData) -> bool {
 }
 
 /// The tensor of a window of an image.
-fn fed(feeding: &Feeding, image: &Rgb, window: TileWindow) -> Tensor {
+fn fed(encoding: &InputEncoding, image: &Rgb, window: TileWindow) -> Tensor {
     let dark = DarkImage::new(image);
     let fed = FedImage::Window {
         dark: &dark,
         window,
-        pad: feeding.pad,
+        pad: encoding.pad,
     };
-    feeding.tensor(&fed).unwrap()
+    encoding.tensor(&fed).unwrap()
 }
 
 fn floats(input: &Tensor) -> &[f32] {
@@ -76,19 +76,19 @@ fn every_convention_gives_every_byte_back() {
             (ElementType::Uint8, ValueRange::Bytes),
         ] {
             for color in [ChannelOrder::Rgb, ChannelOrder::Bgr] {
-                let feeding = Feeding {
+                let encoding = InputEncoding {
                     layout,
                     element: element.clone(),
                     color,
                     range,
-                    ..FEEDING
+                    ..ENCODING
                 };
-                let input = fed(&feeding, &image, whole(&image));
-                let reading = OutputReading {
+                let input = fed(&encoding, &image, whole(&image));
+                let decoding = OutputDecoding {
                     preferred: layout,
                     color,
                     range,
-                    ..reading()
+                    ..decoding()
                 };
                 let samples = match &input.data {
                     TensorData::Float32(values) => TensorSamples::Float32(values),
@@ -101,8 +101,8 @@ fn every_convention_gives_every_byte_back() {
                     .iter()
                     .map(|dim| i64::try_from(*dim).unwrap())
                     .collect();
-                assert_eq!(reading.layout(&dims, [11, 24]), Some((layout, 3)));
-                let bytes = reading
+                assert_eq!(decoding.layout(&dims, [11, 24]), Some((layout, 3)));
+                let bytes = decoding
                     .bytes(samples, layout, [11, 24], whole(&image))
                     .unwrap();
                 assert_eq!(bytes, image.samples(), "{layout} {element} {range} {color}");
@@ -112,19 +112,19 @@ fn every_convention_gives_every_byte_back() {
                     right: 7,
                     bottom: 3,
                 };
-                let bytes = reading.bytes(samples, layout, [11, 24], part).unwrap();
+                let bytes = decoding.bytes(samples, layout, [11, 24], part).unwrap();
                 assert_eq!(bytes, image.samples()[(2 * 24 + 3) * 3..][..12]);
                 // Planes of floats, for models of a fixed size, are fed and read in the same way.
                 let certainty = Certainty::Known;
                 let read = |part| {
-                    let planes = reading.planes(samples, (layout, 3), [11, 24], part, certainty);
+                    let planes = decoding.planes(samples, (layout, 3), [11, 24], part, certainty);
                     planes.unwrap().to_rgb(Rounding::Round).unwrap()
                 };
                 assert_eq!(read(part).samples(), bytes);
                 assert_eq!(read(whole(&image)), image);
                 if element != ElementType::Float16 {
                     let planes = Planes::from_rgb(&image);
-                    let fed = feeding.tensor(&FedImage::Whole(&planes)).unwrap();
+                    let fed = encoding.tensor(&FedImage::Whole(&planes)).unwrap();
                     assert!(near(&fed.data, &input.data) && fed.dims == input.dims);
                 }
             }
@@ -135,16 +135,16 @@ fn every_convention_gives_every_byte_back() {
 #[test]
 fn mean_and_deviation_are_the_models_channels() {
     let image = Rgb::new(1, 1, vec![255, 0, 51]).unwrap();
-    let feeding = Feeding {
+    let encoding = InputEncoding {
         mean: [0.5, 0.25, 0.0],
         std: [0.5, 0.25, 0.1],
-        ..FEEDING
+        ..ENCODING
     };
-    let input = fed(&feeding, &image, whole(&image));
+    let input = fed(&encoding, &image, whole(&image));
     assert_eq!(floats(&input), [1.0, -1.0, 2.0]);
-    let blue_first = Feeding {
+    let blue_first = InputEncoding {
         color: ChannelOrder::Bgr,
-        ..feeding
+        ..encoding
     };
     let input = fed(&blue_first, &image, whole(&image));
     assert_eq!(floats(&input), [(0.2 - 0.5) / 0.5, -1.0, 10.0]);
@@ -163,13 +163,13 @@ fn pixels_beyond_the_image_are_padded() {
         (Padding::Replicate, [1, 2, 3, 3, 3, 3, 3, 3], 1),
         (Padding::Zero, [1, 2, 3, 0, 0, 0, 0, 0], 0),
     ] {
-        let feeding = Feeding {
+        let encoding = InputEncoding {
             pad,
             element: ElementType::Uint8,
             range: ValueRange::Bytes,
-            ..FEEDING
+            ..ENCODING
         };
-        let TensorData::Uint8(bytes) = fed(&feeding, &image, wide).data else {
+        let TensorData::Uint8(bytes) = fed(&encoding, &image, wide).data else {
             panic!("no bytes");
         };
         assert_eq!(bytes[..8], row, "{pad}");
@@ -187,12 +187,12 @@ fn samples_are_clamped_and_rounded() {
         bottom: 1,
     };
     let bytes = |rounding| {
-        let reading = OutputReading {
+        let decoding = OutputDecoding {
             rounding,
-            ..reading()
+            ..decoding()
         };
         let samples = TensorSamples::Float32(&values);
-        reading
+        decoding
             .bytes(samples, TensorLayout::Nchw, [1, 2], part)
             .unwrap()
     };
@@ -201,16 +201,16 @@ fn samples_are_clamped_and_rounded() {
     assert_eq!(bytes(Rounding::Truncate), [0, 127, 1, 255, 255, 1]);
     for i in 0..=u16::MAX {
         let code = f32::from(i) / 257.0;
-        assert_eq!(nearest(code), code.round() as u8);
+        assert_eq!(round_to_u8(code), code.round() as u8);
     }
-    assert_eq!((nearest(0.499_999_97), nearest(254.5)), (0, 255));
+    assert_eq!((round_to_u8(0.499_999_97), round_to_u8(254.5)), (0, 255));
 }
 
 #[test]
 fn values_of_another_range_are_refused() {
-    let checked = |values: &[f32], range, certainty| check(values, range, certainty).err();
+    let checked = |values: &[f32], range, certainty| check_values(values, range, certainty).err();
     let likely = |values: &[f32], range| match checked(values, range, Certainty::Assumed) {
-        Some(OutOfRange::Beyond { likely, .. }) => Some(likely),
+        Some(InvalidValues::OutOfRange { likely, .. }) => Some(likely),
         other => {
             assert_eq!(other, None);
             None
@@ -239,16 +239,16 @@ fn values_of_another_range_are_refused() {
         None
     );
     let broken = checked(&[0.0, f32::NAN], ValueRange::Unit, Certainty::Known);
-    assert_eq!(broken, Some(OutOfRange::NotNumbers));
+    assert_eq!(broken, Some(InvalidValues::NanOutput));
 }
 
 #[test]
 fn the_luma_of_an_expression_is_fed_in_its_range() {
     let image = Rgb::new(1, 2, vec![255, 0, 51, 51, 51, 51]).unwrap();
-    let luma = Feeding {
+    let luma = InputEncoding {
         channels: Channels::Y,
         range: ValueRange::Signed,
-        ..FEEDING
+        ..ENCODING
     };
     let input = fed(&luma, &image, whole(&image));
     assert_eq!(input.dims, [1, 1, 1, 2]);
@@ -261,15 +261,15 @@ fn the_luma_of_an_expression_is_fed_in_its_range() {
     };
     near(floats(&input), [2.0 * (0.299 + 0.114 * 0.2) - 1.0, -0.6]);
     // The expression is of the dark image in 0..1, before luma and range.
-    let squared = Feeding {
+    let squared = InputEncoding {
         input: "image ^ 2".parse().ok(),
         ..luma
     };
     let input = fed(&squared, &image, whole(&image));
     near(floats(&input), [2.0 * (0.299 + 0.114 * 0.04) - 1.0, -0.92]);
-    let endless = Feeding {
+    let endless = InputEncoding {
         input: "image / 0".parse().ok(),
-        ..FEEDING
+        ..ENCODING
     };
     let planes = Planes::from_rgb(&image);
     assert_eq!(endless.tensor(&FedImage::Whole(&planes)), None);

@@ -1,4 +1,4 @@
-//! Conversion of a model's output tensor to an image of bytes: [`OutputReading`].
+//! Conversion of a model's output tensor to an image of bytes: [`OutputDecoding`].
 //!
 //! One pass checks the values, another clamps and rounds them.
 
@@ -17,7 +17,7 @@ use crate::sizing::TileWindow;
 
 /// Conversion of an output tensor to an image.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct OutputReading {
+pub(crate) struct OutputDecoding {
     /// Order of the dimensions; `None` if only a run shows it.
     pub(crate) layout: Option<TensorLayout>,
     /// Layout that is chosen if several fit: that of the input.
@@ -46,13 +46,13 @@ pub(super) enum Certainty {
 
 /// Problem with the values of an output, or of an input.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum OutOfRange {
+pub(crate) enum InvalidValues {
     /// Some values are not numbers (NaN).
-    NotNumbers,
+    NanOutput,
     /// The expressions in the sidecar make values that are not finite of the image, which are not fed.
-    NotFed,
+    NonFiniteInput,
     /// The values have another range than the assumed one.
-    Beyond {
+    OutOfRange {
         min: f32,
         max: f32,
         /// Range that the values seem to have.
@@ -85,7 +85,7 @@ impl<'a> TensorSamples<'a> {
     }
 }
 
-impl OutputReading {
+impl OutputDecoding {
     /// The conversion that an output, the input and the convention define.
     pub(super) fn new(output: &Output, input: &ImageInput, convention: &ModelSidecar) -> Self {
         let mean_and_std = convention.mean_and_std_out();
@@ -148,17 +148,17 @@ impl OutputReading {
         layout: TensorLayout,
         size: [usize; 2],
         part: TileWindow,
-    ) -> Result<Vec<u8>, OutOfRange> {
+    ) -> Result<Vec<u8>, InvalidValues> {
         if let TensorSamples::Uint8(bytes) = samples {
-            return Ok(self.gather(bytes, layout, size, part, |byte| byte));
+            return Ok(self.gather_bytes(bytes, layout, size, part, |byte| byte));
         }
         let values = samples.floats();
-        check(&values, self.range, self.certainty)?;
+        check_values(&values, self.range, self.certainty)?;
         let (range, rounding) = (self.range, self.rounding);
-        Ok(self.gather(&values, layout, size, part, |value| {
-            let code = range.code(value).clamp(0.0, 255.0);
+        Ok(self.gather_bytes(&values, layout, size, part, |value| {
+            let code = range.to_code(value).clamp(0.0, 255.0);
             match rounding {
-                Rounding::Round => nearest(code),
+                Rounding::Round => round_to_u8(code),
                 Rounding::Truncate => code as u8,
             }
         }))
@@ -172,11 +172,11 @@ impl OutputReading {
         [height, width]: [usize; 2],
         part: TileWindow,
         certainty: Certainty,
-    ) -> Result<Planes, OutOfRange> {
+    ) -> Result<Planes, InvalidValues> {
         let values = samples.floats();
         // Other channels than those that are read may have any values.
         if self.slice.is_none() {
-            check(&values, self.range, certainty)?;
+            check_values(&values, self.range, certainty)?;
         }
         let all = channels;
         let (first, channels) = self
@@ -199,7 +199,7 @@ impl OutputReading {
             }
             match self.range {
                 ValueRange::Unit => value,
-                ValueRange::Bytes | ValueRange::Signed => self.range.code(value) / 255.0,
+                ValueRange::Bytes | ValueRange::Signed => self.range.to_code(value) / 255.0,
             }
         };
         let mut samples = Vec::with_capacity(channels * part.size()[0] * part.size()[1]);
@@ -209,7 +209,7 @@ impl OutputReading {
             }
         }
         if samples.iter().any(|sample| sample.is_nan()) {
-            return Err(OutOfRange::NotNumbers);
+            return Err(InvalidValues::NanOutput);
         }
         Ok(Planes {
             height: part.size()[0],
@@ -218,7 +218,7 @@ impl OutputReading {
         })
     }
 
-    fn gather<T: Copy>(
+    fn gather_bytes<T: Copy>(
         &self,
         samples: &[T],
         layout: TensorLayout,
@@ -254,11 +254,11 @@ impl OutputReading {
 ///
 /// Models that do not clamp overshoot by a little. So the range counts as wrong only if more than one sample in 20 is far
 /// outside.
-pub(super) fn check(
+pub(super) fn check_values(
     values: &[f32],
     range: ValueRange,
     certainty: Certainty,
-) -> Result<(), OutOfRange> {
+) -> Result<(), InvalidValues> {
     let (mut nans, mut below, mut above) = (0_usize, 0_usize, 0_usize);
     let mut max = f32::NEG_INFINITY;
     for value in values {
@@ -268,7 +268,7 @@ pub(super) fn check(
         above += usize::from(*value > 8.0);
     }
     if nans > 0 {
-        return Err(OutOfRange::NotNumbers);
+        return Err(InvalidValues::NanOutput);
     }
     let tolerated = values.len() / 20;
     let likely = match (certainty, range) {
@@ -277,7 +277,7 @@ pub(super) fn check(
         (Certainty::Assumed, ValueRange::Bytes) if max <= 1.5 => ValueRange::Unit,
         _ => return Ok(()),
     };
-    Err(OutOfRange::Beyond {
+    Err(InvalidValues::OutOfRange {
         min: values.iter().copied().fold(f32::INFINITY, f32::min),
         max,
         likely,
@@ -285,7 +285,7 @@ pub(super) fn check(
 }
 
 /// The code nearest to a value of 0..255; halves are rounded away from zero.
-pub(crate) fn nearest(code: f32) -> u8 {
+pub(crate) fn round_to_u8(code: f32) -> u8 {
     let below = code as u8;
     below + u8::from(code - f32::from(below) >= 0.5)
 }

@@ -1,4 +1,4 @@
-//! Conversion of an image of bytes to the tensor that a model takes: [`Feeding`].
+//! Conversion of an image of bytes to the tensor that a model takes: [`InputEncoding`].
 //!
 //! It takes one pass: a table of 256 values per channel combines range, mean and deviation. With an expression, or for a model
 //! of the luma, the image goes through floats: `input`, channels, range, mean and deviation, in this order.
@@ -12,14 +12,14 @@ use crate::conventions::{
     ChannelOrder, Channels, ElementType, Padding, Signature, TensorLayout, ValueRange,
 };
 use crate::expressions::Expression;
-use crate::outputs::nearest;
+use crate::outputs::round_to_u8;
 use crate::planes::Planes;
 use crate::sizing::TileWindow;
 use darkqa_ground::types::Rgb;
 
 /// Conversion of an image to a tensor.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Feeding {
+pub(crate) struct InputEncoding {
     pub(crate) layout: TensorLayout,
     pub(crate) element: ElementType,
     pub(crate) channels: Channels,
@@ -33,7 +33,7 @@ pub(crate) struct Feeding {
     pub(crate) pad: Padding,
 }
 
-impl Feeding {
+impl InputEncoding {
     /// The conversion that signature and convention define.
     pub(crate) fn new(signature: &Signature, convention: &ModelSidecar) -> Self {
         let element = signature.input.port.element.clone();
@@ -56,18 +56,20 @@ impl Feeding {
             FedImage::Window { dark, window, .. }
                 if self.input.is_none() && self.channels == Channels::Rgb =>
             {
-                Some(self.window(dark.rgb, *window))
+                Some(self.encode_window(dark.rgb, *window))
             }
             _ => {
                 let dark = fed.planes();
                 match &self.input {
-                    None => Some(self.planes(&dark.into_owned().with_channels(self.channels))),
+                    None => {
+                        Some(self.encode_planes(&dark.into_owned().with_channels(self.channels)))
+                    }
                     Some(expression) => {
                         let image = expression
                             .evaluate(&vec![&*dark; expression.names().len()], fed.size());
                         let finite = image.samples.iter().all(|sample| sample.is_finite());
                         let image = image.spread().with_channels(self.channels);
-                        finite.then(|| self.planes(&image))
+                        finite.then(|| self.encode_planes(&image))
                     }
                 }
             }
@@ -75,7 +77,7 @@ impl Feeding {
     }
 
     /// The tensor of a window of an image, padded beyond the image's edges.
-    fn window(&self, image: &Rgb, window: TileWindow) -> Tensor {
+    fn encode_window(&self, image: &Rgb, window: TileWindow) -> Tensor {
         let sources = |from: usize, to: usize, side: usize| -> Vec<Option<usize>> {
             (from..to).map(|at| self.pad.source(at, side)).collect()
         };
@@ -106,28 +108,28 @@ impl Feeding {
         match self.element {
             ElementType::Uint8 => {
                 let mut data = vec![0; 3 * size[0] * size[1]];
-                fill(&mut data, order, &rows, size[1], row_of, |_, byte| byte);
-                self.shaped(size, TensorData::Uint8(data))
+                fill_tensor(&mut data, order, &rows, size[1], row_of, |_, byte| byte);
+                self.tensor_of_size(size, TensorData::Uint8(data))
             }
             ElementType::Float16 => {
-                let table = self.table().map(|values| values.map(f16::from_f32));
+                let table = self.code_table().map(|values| values.map(f16::from_f32));
                 let mut data = vec![f16::ZERO; 3 * size[0] * size[1]];
                 let value = |channel: usize, byte: u8| table[channel][usize::from(byte)];
-                fill(&mut data, order, &rows, size[1], row_of, value);
-                self.shaped(size, TensorData::Float16(data))
+                fill_tensor(&mut data, order, &rows, size[1], row_of, value);
+                self.tensor_of_size(size, TensorData::Float16(data))
             }
             _ => {
-                let table = self.table();
+                let table = self.code_table();
                 let mut data = vec![0.0; 3 * size[0] * size[1]];
                 let value = |channel: usize, byte: u8| table[channel][usize::from(byte)];
-                fill(&mut data, order, &rows, size[1], row_of, value);
-                self.shaped(size, TensorData::Float32(data))
+                fill_tensor(&mut data, order, &rows, size[1], row_of, value);
+                self.tensor_of_size(size, TensorData::Float32(data))
             }
         }
     }
 
     /// The tensor of an image of floats that has the model's channels.
-    fn planes(&self, planes: &Planes) -> Tensor {
+    fn encode_planes(&self, planes: &Planes) -> Tensor {
         let [height, width] = [planes.height, planes.width];
         let value = |channel: usize, pixel: usize| {
             let plane = match self.channels {
@@ -156,17 +158,17 @@ impl Feeding {
         };
         let data = match self.element {
             ElementType::Uint8 => {
-                TensorData::Uint8(values.map(|(_, unit)| nearest(unit * 255.0)).collect())
+                TensorData::Uint8(values.map(|(_, unit)| round_to_u8(unit * 255.0)).collect())
             }
             ElementType::Float16 => {
                 TensorData::Float16(values.map(float).map(f16::from_f32).collect())
             }
             _ => TensorData::Float32(values.map(float).collect()),
         };
-        self.shaped([height, width], data)
+        self.tensor_of_size([height, width], data)
     }
 
-    fn shaped(&self, size: [usize; 2], data: TensorData) -> Tensor {
+    fn tensor_of_size(&self, size: [usize; 2], data: TensorData) -> Tensor {
         Tensor {
             dims: self.layout.dims(size, self.channels.count()),
             data,
@@ -174,7 +176,7 @@ impl Feeding {
     }
 
     /// Value of each byte, for each channel of the model.
-    fn table(&self) -> [[f32; 256]; 3] {
+    fn code_table(&self) -> [[f32; 256]; 3] {
         [0, 1, 2].map(|channel: usize| {
             std::array::from_fn(|byte| {
                 let value = self.range.scale_code(byte as f32);
@@ -191,7 +193,7 @@ enum SampleOrder {
 }
 
 /// Fills a tensor row by row.
-fn fill<T, I: Iterator<Item = u8>>(
+fn fill_tensor<T, I: Iterator<Item = u8>>(
     data: &mut [T],
     order: SampleOrder,
     rows: &[Option<usize>],
