@@ -1,4 +1,4 @@
-//! Graphs loaded into ONNX Runtime: their ports, sessions and runs.
+//! Graphs loaded into ONNX Runtime: inputs, outputs, sessions and runs.
 
 mod graph;
 mod network;

@@ -1,4 +1,4 @@
-//! Inputs of a graph: the image as a tensor, and further values.
+//! Inputs of a graph: the encoded image, and further values.
 
 mod fed_image;
 mod further_input;

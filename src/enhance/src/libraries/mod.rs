@@ -1,4 +1,4 @@
-//! ONNX Runtime's library: its search, installation, check and opening, and the thread on which it works.
+//! The ONNX Runtime library: search, installation, check, loading, and the thread on which it runs.
 
 mod install;
 mod library;

@@ -6,6 +6,7 @@
 //! of the process and written an identifier to the user's cache folder (seen with 1.31.1 on Linux). The environment variable
 //! [`TELEMETRY_SWITCH`] takes effect earlier, so programs must call [`disable_telemetry`] first.
 
+use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -105,9 +106,8 @@ impl RuntimeSearch {
     /// # Errors
     /// If `self.library` is another library than the open one.
     fn check_same(&self, runtime: &Runtime) -> Result<Runtime> {
-        let resolved = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
         match &self.library {
-            Some(path) if resolved(path) != resolved(runtime.path()) => Err(unusable_library(
+            Some(path) if resolve(path) != resolve(runtime.path()) => Err(unusable_library(
                 path,
                 &format!(
                     "cannot be loaded, because this process has already loaded {}",
@@ -117,6 +117,11 @@ impl RuntimeSearch {
             _ => Ok(runtime.clone()),
         }
     }
+}
+
+/// The path without links; unchanged if the file does not exist.
+fn resolve(path: &Path) -> PathBuf {
+    path.canonicalize().unwrap_or_else(|_| path.to_owned())
 }
 
 /// A usable library that is not open yet.
@@ -236,6 +241,10 @@ fn unusable_library(path: &Path, problem: &str) -> Error {
     ))
 }
 
+fn start_error(path: &Path, error: impl fmt::Display) -> Error {
+    Error::Runtime(format!("{}: {error}", path.display()))
+}
+
 impl Runtime {
     /// Loads a library that [`probe`] accepted, and starts its thread.
     fn start(found: FoundLibrary) -> Result<Self> {
@@ -244,7 +253,6 @@ impl Runtime {
             version,
             place,
         } = found;
-        let fault = |e: &dyn std::error::Error| Error::Runtime(format!("{}: {e}", path.display()));
         if std::env::var_os(TELEMETRY_SWITCH).is_none_or(|value| value != "1") {
             tracing::warn!(
                 "ONNX Runtime may report its use to Microsoft; set {TELEMETRY_SWITCH}=1 in the environment to forbid it"
@@ -257,13 +265,13 @@ impl Runtime {
             }
         });
         let environment = ort::init_from(&path)
-            .map_err(|e| fault(&e))?
+            .map_err(|e| start_error(&path, e))?
             .with_telemetry(false)
             .with_logger(logger)
             .build()
-            .map_err(|e| fault(&e))?;
+            .map_err(|e| start_error(&path, e))?;
         environment.set_log_level(LogLevel::Warning);
-        let thread = RuntimeThread::start().map_err(|e| fault(&e))?;
+        let thread = RuntimeThread::start().map_err(|e| start_error(&path, e))?;
         tracing::debug!("ONNX Runtime {version} from {}", path.display());
         Ok(Self(Arc::new(OpenRuntime {
             path,
@@ -279,8 +287,11 @@ impl Runtime {
     /// The first thread starts the second one, which on Linux then inherits the CPU setting that treats subnormal numbers as zero. On
     /// other systems, subnormal numbers may slow the second thread down, but its results have the same bytes.
     pub(crate) fn with_new_thread(&self) -> Result<Self> {
-        let thread = self.0.thread.run(RuntimeThread::start)?;
-        let thread = thread.map_err(|e| Error::Runtime(e.to_string()))?;
+        let thread = self
+            .0
+            .thread
+            .run(RuntimeThread::start)?
+            .map_err(|e| Error::Runtime(e.to_string()))?;
         Ok(Self(Arc::new(OpenRuntime {
             path: self.0.path.clone(),
             version: self.0.version.clone(),

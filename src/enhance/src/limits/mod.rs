@@ -1,4 +1,4 @@
-//! Limits of memory and time.
+//! Limits of memory and time for enhancers.
 
 mod control_group;
 pub(super) mod memory;

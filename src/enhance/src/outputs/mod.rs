@@ -1,4 +1,4 @@
-//! Outputs of a graph: their choice, and the image made of them.
+//! Outputs of a graph: their choice, decoding, and composition to an image.
 
 mod composition;
 mod output;
