@@ -291,7 +291,9 @@ mod tests {
         let stuck = thread.run_within(
             within(Duration::from_millis(1)),
             || {},
-            move || drop(blocked.recv()),
+            move || {
+                let _ended = blocked.recv();
+            },
         );
         let message = stuck.unwrap_err().to_string();
         assert!(message.contains("--llie-options timeout"), "{message}");

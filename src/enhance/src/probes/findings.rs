@@ -1,4 +1,4 @@
-//! [`Findings`]: cached results of opening and probing an enhancer.
+//! Results of opening and probing an enhancer, to be stored and reused: [`Findings`].
 
 use std::path::Path;
 
@@ -11,29 +11,29 @@ use darkqa_ground::error::Result;
 use darkqa_ground::types::EnhancerName;
 use darkqa_ground::types::manifests::{ConventionLine, ProbeNote, ProbeOutcome};
 
-/// Results of opening an enhancer and trying it on dark frames: the content of its note before the first image.
+/// Results of opening an enhancer and probing it on dark frames: the content of its usage record before the first image.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Findings {
-    /// How the model is fed and read.
+    /// Rows of the table of the model's input and output convention.
     convention: Vec<ConventionLine>,
     /// Result of the probe; `None` if the model accepts none of its sizes.
     probe: Option<ProbeNote>,
     /// Caveats for readers of the results.
     #[serde(default)]
     remarks: Vec<String>,
-    /// The sizes that the model takes, in words, if they were found by trial.
+    /// Message about the accepted sizes, if they were found by trial.
     sizes: Option<String>,
 }
 
 impl Findings {
-    /// Whether a run that treats implausible images like this may go on with them.
+    /// True if a run with this reaction to implausible images may use the enhancer.
     pub fn allow(&self, implausible: Implausible) -> bool {
         let probe = self.probe.as_ref();
         let is_overruled = probe.is_some_and(|probe| probe.outcome == ProbeOutcome::Overruled);
         implausible != Implausible::Refused || !is_overruled
     }
 
-    /// A note that begins with them.
+    /// A usage record that starts with these findings.
     pub fn usage(&self) -> Usage {
         let usage = Usage::default();
         usage.update(|note| {
@@ -44,7 +44,7 @@ impl Findings {
         usage
     }
 
-    /// Repeats the probe's warning.
+    /// Repeats the warnings of the probe.
     pub fn warn(&self, name: &EnhancerName, path: &Path) {
         if let Some(sizes) = &self.sizes {
             tracing::warn!("{}: {sizes}", path.display());
@@ -63,7 +63,7 @@ impl Findings {
     }
 }
 
-/// Warns about a model that takes none of the sizes of the probe.
+/// Warns about a model that accepts none of the sizes of the probe.
 pub(super) fn warn_not_probed(name: &EnhancerName) {
     tracing::warn!(
         "{name}: its images were not checked, because it fails at small sizes such as 144 × 96; look at some of them"
@@ -71,14 +71,14 @@ pub(super) fn warn_not_probed(name: &EnhancerName) {
 }
 
 impl Enhancer {
-    /// Why its images may be read in a wrong way, if it is used in spite of it; to be called after the probe.
+    /// Problem found by the probe, if the enhancer is used in spite of it; to be called after the probe.
     pub fn overruled_problem(&self) -> Option<String> {
         let probe = self.usage().note().probe?;
         let is_overruled = probe.outcome == ProbeOutcome::Overruled;
         probe.problem.filter(|_| is_overruled)
     }
 
-    /// The findings so far; to be called after the probe.
+    /// Results of opening and probing; to be called after the probe.
     pub fn findings(&self) -> Findings {
         let note = self.usage().note();
         Findings {
@@ -89,7 +89,7 @@ impl Enhancer {
         }
     }
 
-    /// The same enhancer as if the probe had found this now, with a note that it goes on with.
+    /// The enhancer with the findings of an earlier probe instead of a new one, and with a usage record that it continues.
     ///
     /// # Errors
     /// If the graph contradicts its own convention, which is a bug.

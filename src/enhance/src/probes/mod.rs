@@ -1,4 +1,4 @@
-//! Probes of a model on dark frames, and judgement of its images.
+//! Probes of a model on dark frames, and plausibility of its images.
 
 mod doctor;
 mod endpoints;

@@ -1,7 +1,7 @@
-//! The probe: whether a model's images of a few dark frames are plausible, and in which value ranges ([`Probe`]).
+//! Plausibility of a model's images of a few dark frames, by value ranges: [`Probe`].
 //!
-//! A graph does not state its value ranges. So where they are not stated, each pair of ranges is tried. The verdict on a pair is
-//! that of at least half of the frames.
+//! A graph does not declare its value ranges. So every pair of ranges that sidecar, preset and element types allow is tried. A pair is
+//! implausible if at least half of the frames have a flaw.
 
 use std::fmt;
 
@@ -12,17 +12,17 @@ use crate::conventions::sidecar::ADD;
 use crate::outputs::light_map_line;
 use darkqa_ground::types::Flaw;
 
-/// Number of dark frames that a model is tried on: with 6, none of 9 trained models was flagged; with one, 5 % were.
+/// Number of dark frames of a probe. With 6, none of 9 trained models was flagged; with one frame, 5 % were.
 pub const FRAMES: usize = 6;
 
-/// The finding that no range explains a flaw, with the ranges that were tried.
+/// Message that no range explains a flaw, with the ranges that were tried.
 const NONE_FITS: &str =
     "No usual value range fits (0..1, 0..255, -1..1, -0.5..0.5, mean and std of ImageNet or CLIP)";
 
-/// Placeholder for the output that is read, in the remedy for a flaw.
+/// Placeholder in remedies for the name of the output that is read.
 pub(super) const OUTPUT: &str = "OUTPUT";
 
-/// By how many codes black and white must be nearer to themselves with one pair than with the next for it to be advised alone. Chosen.
+/// Difference in [`PairTrial::distance`], in codes, by which the best pair must beat the second to be advised alone. Chosen.
 const CLEAR_MARGIN: f64 = 25.0;
 
 /// A model's images of the dark frames, with one pair of ranges.
@@ -52,23 +52,23 @@ impl PairTrial {
         }
     }
 
-    /// Whether no frame has a flaw.
+    /// True if no frame has a flaw.
     pub(super) fn is_clean(&self) -> bool {
         self.verdicts.iter().all(Option::is_none)
     }
 
-    /// Distance of black and white from themselves, in codes; infinite if it was not measured.
+    /// Distance of the outputs for black and white from black and white, in codes; infinite if it was not measured.
     pub(super) fn distance(&self) -> f64 {
         self.endpoints
             .map_or(f64::INFINITY, |endpoints| endpoints.distance)
     }
 
-    /// Whether black and white stay near to themselves.
+    /// True if black stays nearly black and white nearly white.
     pub(super) fn is_near(&self) -> bool {
         self.endpoints.is_some_and(Endpoints::are_near)
     }
 
-    /// The ranges, and what black and white become with them, if it was measured.
+    /// Description of the ranges, with the outputs for black and white if they were measured.
     fn description(&self) -> String {
         match self.endpoints {
             None => self.ranges.to_string(),
@@ -84,24 +84,28 @@ impl PairTrial {
         }
     }
 
-    /// The verdict on the model: the most frequent flaw, if at least half of the frames have one.
+    /// Verdict on the pair: the most frequent flaw, if at least half of the frames have one.
     pub(super) fn verdict(&self) -> Option<FlawedFrames> {
         self.most_frequent_flaw()
             .filter(|seen| 2 * seen.flawed >= seen.frames)
     }
 
-    /// The most frequent flaw, if a frame has one.
+    /// The most frequent flaw; `None` if no frame has one.
     fn most_frequent_flaw(&self) -> Option<FlawedFrames> {
         let flawed: Vec<Verdict> = self.verdicts.iter().flatten().copied().collect();
-        let half = |count: usize| 2 * count >= self.verdicts.len().max(1);
-        let count = |flaw: Flaw| flawed.iter().filter(|one| one.flaw == flaw).count();
         // Reversed, because `max_by_key` returns the last of equally frequent flaws and the first is wanted.
-        let example = flawed.iter().rev().max_by_key(|one| count(one.flaw))?;
+        let example = flawed.iter().rev().max_by_key(|verdict| {
+            flawed
+                .iter()
+                .filter(|other| other.flaw == verdict.flaw)
+                .count()
+        })?;
         let impossible = flawed
             .iter()
-            .filter(|one| one.gravity == Gravity::Impossible);
+            .filter(|verdict| verdict.gravity == Gravity::Impossible)
+            .count();
         Some(FlawedFrames {
-            gravity: if half(impossible.count()) {
+            gravity: if 2 * impossible >= self.verdicts.len().max(1) {
                 Gravity::Impossible
             } else {
                 Gravity::Doubtful
@@ -124,7 +128,7 @@ pub(super) struct FlawedFrames {
 }
 
 impl fmt::Display for FlawedFrames {
-    /// The finding as it follows the file's name.
+    /// Writes the verdict, to follow the file's name.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
             example,
@@ -139,22 +143,22 @@ impl fmt::Display for FlawedFrames {
     }
 }
 
-/// Ranges that the user, a preset or the element types state.
+/// Which ranges the sidecar, a preset or the element types state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum StatedRanges {
-    /// Both.
+    /// Both ranges.
     Both,
-    /// Range of either the input or the output.
+    /// The range of either input or output.
     One,
-    /// None.
+    /// Neither range.
     Neither,
 }
 
-/// All that was tried.
+/// Trials of a model with all pairs of ranges.
 #[derive(Debug, Clone)]
 pub(super) struct Probe {
     pub(super) ranges: StatedRanges,
-    /// The ranges that are used if the probe does not decide.
+    /// Ranges that are used unless the probe finds a flaw with them.
     pub(super) usual: RangePair,
     pub(super) pairs: Vec<PairTrial>,
 }
@@ -164,20 +168,20 @@ pub(super) struct Probe {
 pub(super) enum Conclusion {
     /// The ranges are stated, and the images are plausible.
     Plausible,
-    /// The images are plausible with the usual ranges, which nothing states.
+    /// The images are plausible with the usual ranges, which are assumed.
     Assumed,
-    /// The ranges are stated, and the images are odd, but some models do that.
+    /// The ranges are stated, and the images have a flaw that some models have.
     Doubtful(FlawedFrames),
-    /// The ranges are stated or all were tried, and the images are implausible.
+    /// The images are implausible with the stated ranges, or with all ranges.
     Implausible(FlawedFrames),
-    /// Only these ranges give plausible images, or they keep black and white nearest to themselves, and they are not the usual ones.
+    /// The images are implausible with the usual ranges, and plausible only or most clearly with this pair.
     Other(RangePair, FlawedFrames),
-    /// Several pairs of ranges give plausible images, the likely ones first, but not the usual ones.
+    /// The images are implausible with the usual ranges, and plausible with these pairs, the likely ones first.
     Several(Vec<RangePair>, FlawedFrames),
 }
 
 impl Probe {
-    /// The pairs whose images are plausible.
+    /// Pairs with which the images are plausible.
     pub(super) fn plausible(&self) -> Vec<RangePair> {
         self.pairs
             .iter()
@@ -186,12 +190,12 @@ impl Probe {
             .collect()
     }
 
-    /// Draws the conclusion.
+    /// Conclusion from all trials.
     pub(super) fn conclusion(&self) -> Conclusion {
         let usual = self.usual_pair();
         let advised = self.advised();
         let seen = usual.and_then(|usual| {
-            // With a flaw on some frames, other than dim images, it gives way to a pair without any.
+            // A flaw on a few frames, other than dim images, counts if another pair has no flaw at all.
             let mixed = usual.most_frequent_flaw().filter(|seen| {
                 let is_open = self.ranges != StatedRanges::Both && !advised.is_empty();
                 is_open && seen.example.flaw != Flaw::Unlit
@@ -215,12 +219,12 @@ impl Probe {
         }
     }
 
-    /// The usual pair; `None` if it was not tried.
+    /// Trial of the usual pair; `None` if it was not tried.
     pub(super) fn usual_pair(&self) -> Option<&PairTrial> {
         self.pairs.iter().find(|pair| pair.ranges == self.usual)
     }
 
-    /// The pairs that may be advised in place of the usual one: those whose images of all frames are plausible.
+    /// Pairs that may be advised instead of the usual one: those without a flaw on any frame.
     fn advised(&self) -> Vec<&PairTrial> {
         self.pairs
             .iter()
@@ -228,7 +232,7 @@ impl Probe {
             .collect()
     }
 
-    /// The plausible pair that black and white point to; `None` if several are as likely.
+    /// The plausible pair that preserves black and white clearly best; `None` without such a pair.
     pub(super) fn likeliest(&self) -> Option<RangePair> {
         let plausible: Vec<&PairTrial> = self
             .pairs
@@ -238,8 +242,7 @@ impl Probe {
         clear_first(&plausible).map(|pair| pair.ranges)
     }
 
-    /// Puts the pairs first with which black and white stay nearest to themselves, and removes those with a mean and a deviation with
-    /// which they do not.
+    /// Sorts the pairs by how well they preserve black and white, and removes normalised pairs that do not preserve them.
     pub(super) fn rank(&mut self) {
         self.pairs
             .retain(|pair| pair.ranges.is_plain() || pair.is_near());
@@ -247,13 +250,13 @@ impl Probe {
             .sort_by(|a, b| a.distance().total_cmp(&b.distance()));
     }
 
-    /// Leaves out pairs that are plausible on most frames, but not on all.
+    /// Removes pairs that are plausible on most frames, but not on all.
     pub(super) fn leave_out_mixed(&mut self) {
         self.pairs
             .retain(|pair| pair.is_clean() || pair.verdict().is_some());
     }
 
-    /// Whether the images in the usual ranges are merely not brighter.
+    /// True if the only flaw in the usual ranges is that images are not brighter, and ranges are not stated.
     fn is_dim(&self, seen: &FlawedFrames) -> bool {
         self.ranges != StatedRanges::Both
             && seen.example.flaw == Flaw::Unlit
@@ -265,16 +268,8 @@ impl Probe {
         self.plausible().first().copied().unwrap_or(self.usual)
     }
 
-    /// The finding and the sidecar lines that would repair it, to follow the file's name; `None` if the images are plausible.
+    /// Message about the flaw and the sidecar lines that would repair it, to follow the file's name; `None` if the images are plausible.
     pub(super) fn problem(&self) -> Option<String> {
-        let usual = self.usual.stated();
-        let dim = |seen: &FlawedFrames| {
-            if self.is_dim(seen) {
-                format!("If its images should be this dim, {ADD}: {usual}. ")
-            } else {
-                String::new()
-            }
-        };
         Some(match self.conclusion() {
             Conclusion::Plausible | Conclusion::Assumed => return None,
             Conclusion::Doubtful(seen) => format!("{seen}"),
@@ -283,7 +278,7 @@ impl Probe {
             }
             Conclusion::Other(pair, seen) => format!(
                 "{seen}. {}With {} they are plausible; if the model's code uses these, {ADD}: {}",
-                dim(&seen),
+                self.advice_for_dim(&seen),
                 self.pair_description(pair),
                 pair.stated()
             ),
@@ -294,7 +289,7 @@ impl Probe {
                     .collect();
                 format!(
                     "{seen}. {}With other value ranges they are plausible ({}); {ADD} those of the model's code, such as {}",
-                    dim(&seen),
+                    self.advice_for_dim(&seen),
                     list.join("; "),
                     pairs[0].stated()
                 )
@@ -302,7 +297,17 @@ impl Probe {
         })
     }
 
-    /// A pair, and what black and white become with it.
+    /// Advice for a model whose images may be dim on purpose; empty for other flaws.
+    fn advice_for_dim(&self, seen: &FlawedFrames) -> String {
+        if self.is_dim(seen) {
+            let usual = self.usual.stated();
+            format!("If its images should be this dim, {ADD}: {usual}. ")
+        } else {
+            String::new()
+        }
+    }
+
+    /// Description of a pair of ranges, see [`PairTrial::description`].
     fn pair_description(&self, ranges: RangePair) -> String {
         self.pairs
             .iter()
@@ -327,7 +332,7 @@ impl Probe {
     }
 }
 
-/// The first of ranked pairs if it is the only one, or if black and white are clearly nearer to themselves with it than with the second.
+/// The first of ranked pairs, if it is the only one or preserves black and white clearly better than the second.
 fn clear_first<'p>(ranked: &[&'p PairTrial]) -> Option<&'p PairTrial> {
     match ranked {
         [] => None,
@@ -385,22 +390,18 @@ mod tests {
         output: ValueScale::Range(ValueRange::Bytes),
     };
 
-    fn pair(ranges: RangePair, flaws: &[Option<(Flaw, Gravity)>]) -> PairTrial {
-        let verdict = |(flaw, gravity)| Verdict {
-            flaw,
-            gravity,
-            figure: 0.0,
-        };
+    /// A pair with these verdicts on the frames.
+    fn pair(ranges: RangePair, verdicts: &[Option<Verdict>]) -> PairTrial {
         PairTrial {
             ranges,
             made: Vec::new(),
-            verdicts: flaws.iter().map(|flaw| flaw.map(verdict)).collect(),
+            verdicts: verdicts.to_vec(),
             endpoints: None,
         }
     }
 
-    /// A plausible pair with black and white so far from themselves, in codes.
-    fn far(ranges: RangePair, distance: f64) -> PairTrial {
+    /// A plausible pair with this distance of black and white, in codes.
+    fn pair_at_distance(ranges: RangePair, distance: f64) -> PairTrial {
         let endpoints = Endpoints {
             black: distance,
             white: 255.0,
@@ -420,9 +421,28 @@ mod tests {
         }
     }
 
-    const FLAT: Option<(Flaw, Gravity)> = Some((Flaw::Flat, Gravity::Impossible));
-    const WHITE: Option<(Flaw, Gravity)> = Some((Flaw::White, Gravity::Doubtful));
-    const UNLIT: Option<(Flaw, Gravity)> = Some((Flaw::Unlit, Gravity::Doubtful));
+    /// Conclusion from these pairs after ranking.
+    fn ranked_conclusion(pairs: Vec<PairTrial>) -> Conclusion {
+        let mut probe = probe(StatedRanges::Neither, pairs);
+        probe.rank();
+        probe.conclusion()
+    }
+
+    const FLAT: Option<Verdict> = Some(Verdict {
+        flaw: Flaw::Flat,
+        gravity: Gravity::Impossible,
+        figure: 0.0,
+    });
+    const WHITE: Option<Verdict> = Some(Verdict {
+        flaw: Flaw::White,
+        gravity: Gravity::Doubtful,
+        figure: 0.0,
+    });
+    const UNLIT: Option<Verdict> = Some(Verdict {
+        flaw: Flaw::Unlit,
+        gravity: Gravity::Doubtful,
+        figure: 0.0,
+    });
 
     #[test]
     fn usual_ranges_are_assumed_if_they_are_plausible() {
@@ -491,8 +511,9 @@ mod tests {
             vec![pair(UNIT, &[UNLIT; 6]), pair(BYTES, &[None; 6])],
         );
         let problem = dim.problem().unwrap();
-        let place = |words: &str| problem.find(words).unwrap();
-        assert!(place("range_in = \"0..1\"") < place("range_in = \"0..255\""));
+        let [usual, other] = ["range_in = \"0..1\"", "range_in = \"0..255\""]
+            .map(|line| problem.find(line).unwrap());
+        assert!(usual < other, "{problem}");
     }
 
     #[test]
@@ -501,24 +522,16 @@ mod tests {
             input: UNIT.input,
             output: ValueScale::Range(ValueRange::Signed),
         };
-        let ranked = |first: f64, second: f64| {
-            let pairs = vec![
+        let [clear, close, far] = [(2.0, 120.0), (2.0, 9.0), (90.0, 200.0)].map(|distances| {
+            ranked_conclusion(vec![
                 pair(UNIT, &[FLAT; 6]),
-                far(signed, second),
-                far(BYTES, first),
-            ];
-            let mut probe = probe(StatedRanges::Neither, pairs);
-            probe.rank();
-            probe.conclusion()
-        };
-        assert!(matches!(ranked(2.0, 120.0), Conclusion::Other(BYTES, _)));
-        let Conclusion::Several(pairs, _) = ranked(2.0, 9.0) else {
-            panic!("nearly as near");
-        };
-        assert_eq!(pairs, [BYTES, signed]);
-        let Conclusion::Several(..) = ranked(90.0, 200.0) else {
-            panic!("none is near");
-        };
+                pair_at_distance(signed, distances.1),
+                pair_at_distance(BYTES, distances.0),
+            ])
+        });
+        assert!(matches!(clear, Conclusion::Other(BYTES, _)));
+        assert!(matches!(close, Conclusion::Several(pairs, _) if pairs == [BYTES, signed]));
+        assert!(matches!(far, Conclusion::Several(..)));
     }
 
     #[test]
@@ -527,16 +540,14 @@ mod tests {
             input: ValueScale::Normalised(Normalisation::Clip),
             output: UNIT.output,
         };
-        let conclusion = |distance: f64| {
-            let mut probe = probe(
-                StatedRanges::Neither,
-                vec![pair(UNIT, &[FLAT; 6]), far(clip, distance)],
-            );
-            probe.rank();
-            probe.conclusion()
-        };
-        assert!(matches!(conclusion(10.0), Conclusion::Other(pair, _) if pair == clip));
-        assert!(matches!(conclusion(60.0), Conclusion::Implausible(_)));
+        let [near, far] = [10.0, 60.0].map(|distance| {
+            ranked_conclusion(vec![
+                pair(UNIT, &[FLAT; 6]),
+                pair_at_distance(clip, distance),
+            ])
+        });
+        assert!(matches!(near, Conclusion::Other(pair, _) if pair == clip));
+        assert!(matches!(far, Conclusion::Implausible(_)));
     }
 
     #[test]
@@ -553,12 +564,12 @@ mod tests {
 
     #[test]
     fn half_of_the_frames_decide() {
-        let flawed = |count: usize| {
-            let flaws: Vec<_> = (0..6).map(|i| FLAT.filter(|_| i < count)).collect();
-            probe(StatedRanges::Both, vec![pair(UNIT, &flaws)]).conclusion()
-        };
-        assert_eq!(flawed(2), Conclusion::Plausible);
-        assert!(matches!(flawed(3), Conclusion::Implausible(_)));
+        let two = pair(UNIT, &[FLAT, FLAT, None, None, None, None]);
+        let conclusion = probe(StatedRanges::Both, vec![two]).conclusion();
+        assert_eq!(conclusion, Conclusion::Plausible);
+        let three = pair(UNIT, &[FLAT, FLAT, FLAT, None, None, None]);
+        let conclusion = probe(StatedRanges::Both, vec![three]).conclusion();
+        assert!(matches!(conclusion, Conclusion::Implausible(_)));
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Conclusion of an examination ([`Proposal`]): the proposed lines of a sidecar, with the reason.
+//! Conclusion of an examination: proposed lines of a sidecar ([`Proposal`]).
 
 use crate::conventions::ChannelOrder;
 use crate::probes::probe::{Conclusion, Probe};
@@ -10,20 +10,20 @@ use darkqa_ground::types::Flaw;
 pub enum Settled {
     /// Exactly one convention is plausible.
     Yes,
-    /// Several are, or none is.
+    /// No or several conventions are plausible.
     No,
 }
 
-/// A line of a sidecar.
+/// A proposed line of a sidecar.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ProposedLine {
-    /// The line, as `range_in = "0..1"`.
+    /// The line, such as `range_in = "0..1"`.
     pub line: String,
-    /// Why it is proposed.
+    /// Reason for the proposal.
     pub reason: String,
 }
 
-/// Findings of an examination.
+/// Conclusion of an examination, with proposed lines.
 pub(super) struct Proposal {
     pub(super) lines: Vec<ProposedLine>,
     pub(super) conclusion: String,
@@ -39,7 +39,7 @@ impl Proposal {
         }
     }
 
-    /// The ranges that are stated are plausible.
+    /// No lines, because the stated ranges are plausible.
     pub(super) fn for_stated(pair: RangePair) -> Self {
         let conclusion = format!(
             "With {pair}, as set by MODEL.onnx.toml, the preset or the element types, its images are plausible."
@@ -50,7 +50,7 @@ impl Proposal {
         }
     }
 
-    /// Several outputs could be the image: that which is read, and the plausible others.
+    /// No lines, because several outputs could be the image: `first`, which is read, and `others`, which are plausible.
     pub(super) fn for_unknown_output(first: &str, probe: &Probe, others: &[String]) -> Self {
         let mut plausible: Vec<&str> = Vec::new();
         if !probe.plausible().is_empty() {
@@ -67,7 +67,7 @@ impl Proposal {
         ))
     }
 
-    /// Names the other outputs whose images could be enhanced ones.
+    /// Adds to the conclusion that other outputs give plausible images, too.
     pub(super) fn mention_outputs(&mut self, others: &[String]) {
         for output in others {
             let found = " gives plausible images, too; check which one the model's code uses.";
@@ -75,6 +75,7 @@ impl Proposal {
         }
     }
 
+    /// Lines that state a pair of ranges.
     fn for_ranges(pair: RangePair, conclusion: String) -> Self {
         let reason = "with these value ranges its images are plausible";
         let lines = pair.lines().into_iter().map(|line| ProposedLine {
@@ -89,9 +90,9 @@ impl Proposal {
     }
 }
 
-/// Conclusion from the pairs of ranges: the only plausible one is proposed. `swapped` is the probe with the output's colours in the other
-/// order; it counts if the colours are the reason that nothing else is plausible. If several of its pairs are plausible, the `stated` one
-/// is taken.
+/// Proposes the only plausible pair of ranges. `swapped` is the probe with the output in the other channel order, `order`. It is used if no
+/// pair is plausible in the present order and swapped colours are the flaw; if several of its pairs are plausible, the `stated` one is
+/// proposed.
 pub(super) fn propose(
     probe: &Probe,
     stated: Option<RangePair>,
@@ -139,8 +140,10 @@ pub(super) fn propose(
         }
     }
     let is_hue = probe.pairs.iter().any(|pair| {
-        let seen = pair.verdict();
-        pair.ranges == probe.usual && seen.is_some_and(|seen| seen.example.flaw == Flaw::Hue)
+        pair.ranges == probe.usual
+            && pair
+                .verdict()
+                .is_some_and(|verdict| verdict.example.flaw == Flaw::Hue)
     });
     let plausible = swapped.plausible();
     let pair = match &plausible[..] {

@@ -54,7 +54,7 @@ fn an_enhanced_image_has_no_flaw() {
 }
 
 #[test]
-fn each_wrong_reading_has_its_flaw() {
+fn each_wrong_decoding_has_its_flaw() {
     let good = good();
     let swapped = {
         let mut made = good.clone();
@@ -63,8 +63,7 @@ fn each_wrong_reading_has_its_flaw() {
             .for_each(|pixel| pixel.swap(0, 2));
         made
     };
-    let relabelled = {
-        // Planes read as packed pixels.
+    let planes_as_pixels = {
         let planes = (0..3).flat_map(|channel| good.samples.iter().skip(channel).step_by(3));
         UnclampedImage {
             samples: planes.copied().collect(),
@@ -88,7 +87,7 @@ fn each_wrong_reading_has_its_flaw() {
             Flaw::White,
         ),
         (each(&good, |code| 255.0 - code), Flaw::Inverted),
-        (relabelled, Flaw::Shuffled),
+        (planes_as_pixels, Flaw::Shuffled),
         (swapped, Flaw::Hue),
         (grey, Flaw::Grey),
         (each(&good, |code| f32::midpoint(code, 255.0)), Flaw::Haze),
@@ -106,21 +105,18 @@ fn a_pale_room_is_no_haze() {
     assert_eq!(judge(&pale, &made), None);
     let hazy = each(&good(), |code| f32::midpoint(code, 255.0));
     assert_eq!(judge(&dark(), &hazy).unwrap().flaw, Flaw::Haze);
-    // The rule looks at the dark frame: a dark one that comes out pale is a haze.
+    // The rule compares with the dark frame: a pale output of a frame with dark pixels is a haze.
     assert_eq!(judge(&dark(), &made).unwrap().flaw, Flaw::Haze);
 }
 
 #[test]
-fn a_black_output_is_impossible_and_a_denoised_one_doubtful() {
-    let gravity = |made: &UnclampedImage| judge(&dark(), made).unwrap().gravity;
-    assert_eq!(
-        gravity(&each(&dark(), |code| 0.4 * code)),
-        Gravity::Impossible
-    );
-    assert_eq!(
-        gravity(&each(&dark(), |code| code + 1.0)),
-        Gravity::Doubtful
-    );
+fn black_output_is_impossible_and_unlit_output_doubtful() {
+    for (output, gravity) in [
+        (each(&dark(), |code| 0.4 * code), Gravity::Impossible),
+        (each(&dark(), |code| code + 1.0), Gravity::Doubtful),
+    ] {
+        assert_eq!(judge(&dark(), &output).unwrap().gravity, gravity);
+    }
 }
 
 #[test]
@@ -136,7 +132,7 @@ fn images_smaller_than_a_block_are_judged_too() {
         for (place, sample) in made.samples.iter_mut().enumerate() {
             *sample = 20.0 + (place % 5) as f32 * 10.0;
         }
-        // No figure may be lost in a division by zero.
+        // No figure may be a division by zero.
         if let Some(verdict) = judge(&image, &made) {
             assert!(verdict.figure.is_finite());
         }
