@@ -1,4 +1,4 @@
-//! Sizes of images that a model takes: whole, padded, in tiles, or found by trial.
+//! Input sizes of a model: whole images, padding, tiles, and sizes found by trial.
 
 pub(super) mod reach;
 mod size_plan;

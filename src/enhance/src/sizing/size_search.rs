@@ -1,4 +1,4 @@
-//! Search by trial for the sizes that a model takes, if it fails at the size of an image: [`SizeSearch`].
+//! Search by trial for the sizes that a model accepts, after a failure at an image's size: [`SizeSearch`].
 
 use super::texture::{CODES, texture};
 use super::tiles::TileWindow;
@@ -7,25 +7,25 @@ use crate::failure::{RunFailure, format_size};
 use crate::graphs::{Graph, RunResult};
 use darkqa_ground::error::Result;
 
-/// Multiples of sides that are tried, in this order: those of networks that halve an image, and those of patches of 14 pixels.
+/// Multiples that are tried, in this order, for networks that halve an image repeatedly, and for patches of 14 pixels.
 pub(crate) const MULTIPLES: [usize; 17] = [
     1, 4, 8, 12, 14, 16, 20, 24, 28, 32, 40, 48, 56, 64, 96, 112, 128,
 ];
 
-/// Least side of a trial image, in pixels; chosen: enough for networks that halve the image five times.
+/// Minimum side of a trial image, in pixels; chosen for networks that halve the image five times.
 const MIN_SIDE: usize = 64;
 
-/// Sizes that a model takes, found by trial.
+/// Sizes that a model accepts, found by trial.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum AcceptedSizes {
-    /// Sides of multiples of this number, above 1.
+    /// Sides that are multiples of this number, which is above 1.
     Multiple(usize),
-    /// One height and width alone, frozen by tracing.
+    /// Only this height and width, frozen by tracing.
     Traced([usize; 2]),
 }
 
 impl AcceptedSizes {
-    /// The finding, with the sidecar line that states it.
+    /// Message about the accepted sizes, with the sidecar line that states them.
     pub(crate) fn message(self) -> String {
         match self {
             Self::Multiple(multiple) => format!(
@@ -41,7 +41,7 @@ impl AcceptedSizes {
     }
 }
 
-/// The search, which is made once for a model.
+/// Search for the accepted sizes, made once per model.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct SizeSearch {
     /// Sizes that may be frozen into the graph.
@@ -51,10 +51,10 @@ pub(crate) struct SizeSearch {
 
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 enum SearchState {
-    /// The search has not been made yet.
+    /// Not made yet.
     #[default]
     Open,
-    /// It found nothing, or that the model takes any size of that order.
+    /// Without result: no tried size works, or the model accepts any multiple.
     Nothing,
     Found(AcceptedSizes),
 }
@@ -68,7 +68,7 @@ impl SizeSearch {
         }
     }
 
-    /// Result of the search; `None` before it was made or if it found nothing.
+    /// Result of the search; `None` before the search or without a result.
     pub(crate) fn found(&self) -> Option<AcceptedSizes> {
         match self.state {
             SearchState::Found(found) => Some(found),
@@ -76,7 +76,7 @@ impl SizeSearch {
         }
     }
 
-    /// Searches at the first call, and returns the result.
+    /// Makes the search at the first call, and returns its result.
     pub(crate) fn run(&mut self, graph: &Graph) -> Result<Option<AcceptedSizes>> {
         if self.state == SearchState::Open {
             let found = match find_multiple(graph)? {
@@ -89,7 +89,7 @@ impl SizeSearch {
         Ok(self.found())
     }
 
-    /// The first of the traced sizes at which the model runs.
+    /// Tries the sizes that may be frozen into the graph; returns the first at which the model runs.
     fn find_traced_size(&self, graph: &Graph) -> Result<Option<[usize; 2]>> {
         for size in &self.traced {
             match run_trial(graph, *size)? {
@@ -102,9 +102,9 @@ impl SizeSearch {
     }
 }
 
-/// The smallest of [`MULTIPLES`] that the model needs the sides of images to be multiples of; `None` if none of them suits.
+/// First of [`MULTIPLES`] at which the model runs; `None` if it runs at none of them.
 ///
-/// A multiple is tried at a size that is not a multiple of any larger one, so that a success is evidence for this one.
+/// Each multiple is tried at a size that is not a multiple of any larger one, so that success is evidence for this multiple.
 fn find_multiple(graph: &Graph) -> Result<Option<usize>> {
     for multiple in MULTIPLES {
         match run_trial(graph, trial_size(multiple))? {
@@ -116,7 +116,7 @@ fn find_multiple(graph: &Graph) -> Result<Option<usize>> {
     Ok(None)
 }
 
-/// Height and width of the trial of a multiple: two different primes, from 3 on, times the multiple.
+/// Height and width of the trial image for a multiple: the multiple times two different primes of at least 3.
 fn trial_size(multiple: usize) -> [usize; 2] {
     let mut primes = (3..)
         .filter(|n: &usize| (2..*n).all(|divisor| !n.is_multiple_of(divisor)))
@@ -126,10 +126,10 @@ fn trial_size(multiple: usize) -> [usize; 2] {
 
 /// Result of a trial.
 enum TrialOutcome {
-    /// The model gave an image of the input's size, whatever its values.
+    /// The model returned an image of the input's size, with any values.
     Runs,
     Fails,
-    /// It took more time or memory than an image may, so that no further trial makes sense.
+    /// The run exceeded the limit of time or memory, so further trials make no sense.
     OverLimit,
 }
 
@@ -146,7 +146,7 @@ fn run_trial(graph: &Graph, size: [usize; 2]) -> Result<TrialOutcome> {
     })
 }
 
-/// Message for a model whose sizes were not found, after `failure`.
+/// Message about `failure` for a model whose accepted sizes were not found.
 pub(crate) fn sizes_not_found(failure: &RunFailure, search: &SizeSearch) -> String {
     let words = failure.message();
     if !failure.may_depend_on_size() {
@@ -172,7 +172,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_trial_shows_its_multiple_alone() {
+    fn trial_sizes_are_not_multiples_of_larger_ones() {
         for (index, multiple) in MULTIPLES.into_iter().enumerate() {
             let size = trial_size(multiple);
             assert!(
