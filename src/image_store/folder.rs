@@ -100,8 +100,8 @@ impl StoreFolder {
         result
     }
 
-    /// All files of the store, sorted by path. Foreign files are left out, as are files that are deleted while the folder is read. A missing
-    /// folder has no files.
+    /// All files of the store, sorted by path. Foreign files are left out, as are files that are deleted while the folder is read. A
+    /// missing folder has no files.
     ///
     /// # Errors
     /// If the folder cannot be read.

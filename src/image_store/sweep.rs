@@ -6,9 +6,9 @@ use std::time::{Duration, SystemTime};
 
 use super::folder::{FileKind, StoreFolder, StoredFile};
 
-/// Time since the last use after which an image may be evicted from a full store; chosen. Images used more recently stay even if new ones then
-/// find no room: every model goes through all frames in the same order, so a store that evicted the oldest image of a larger set would never
-/// contain the next one.
+/// Time since the last use after which an image may be evicted from a full store; chosen. Images used more recently stay even if new ones
+/// then find no room: every model goes through all frames in the same order, so a store that evicted the oldest image of a larger set
+/// would never contain the next one.
 const UNUSED: Duration = Duration::from_hours(14 * 24);
 /// Age from which on an incomplete file counts as left behind by a killed process; chosen.
 const ABANDONED: Duration = Duration::from_hours(24);
@@ -22,8 +22,8 @@ pub(super) struct SweepResult {
     pub(super) evicted: usize,
 }
 
-/// Removes abandoned files, and the least recently used of the unused images while the store has more than `max_bytes`. While another process
-/// is sweeping, the bytes are only counted.
+/// Removes abandoned files, and the least recently used of the unused images while the store has more than `max_bytes`. While another
+/// process is sweeping, the bytes are only counted.
 ///
 /// # Errors
 /// If the folder cannot be read.

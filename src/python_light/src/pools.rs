@@ -1,8 +1,8 @@
 //! Thread pools: [`pool`].
 //!
-//! The threads of a pool do not survive a fork. So each process, such as a worker of a `DataLoader`, starts its own pools when they are first
-//! needed. The table of pools, and the tables that the synthesis computes once, are filled only while the GIL is held. `os.fork` holds the GIL,
-//! too, so a forked process never inherits a locked mutex.
+//! The threads of a pool do not survive a fork. So each process, such as a worker of a `DataLoader`, starts its own pools when they are
+//! first needed. The table of pools, and the tables that the synthesis computes once, are filled only while the GIL is held. `os.fork`
+//! holds the GIL, too, so a forked process never inherits a locked mutex.
 
 use std::collections::HashMap;
 use std::process;

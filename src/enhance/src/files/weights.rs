@@ -1,10 +1,10 @@
 //! Weights of an ONNX model, and the flushing of subnormal ones to zero: [`Weights`].
 //!
 //! Training with weight decay leaves subnormal weights, below 2⁻¹²⁶. They do not affect the image, but cost some processors a hundred
-//! cycles per operation. A quarter of Zero-DCE's published weights is subnormal: they made it about 45 times slower on an Intel Xeon, and no
-//! slower on an AMD EPYC. ONNX Runtime's option `session.set_denormal_as_zero` takes effect only in the thread that creates the first
-//! session of a process. So the weights themselves are set to zero before a session is created; the images of Zero-DCE stay the same, byte
-//! for byte. Weights in external files are not changed, because such models are loaded by path; for them, only the option applies.
+//! cycles per operation. A quarter of Zero-DCE's published weights is subnormal: they made it about 45 times slower on an Intel Xeon, and
+//! no slower on an AMD EPYC. ONNX Runtime's option `session.set_denormal_as_zero` takes effect only in the thread that creates the first
+//! session of a process. So the weights themselves are set to zero before a session is created; the images of Zero-DCE stay the same,
+//! byte for byte. Weights in external files are not changed, because such models are loaded by path; for them, only the option applies.
 //!
 //! Field numbers are those of `onnx/onnx.proto` (IR version 13).
 

@@ -132,8 +132,8 @@ impl Port {
 
     /// True if an exporter generated the name: a number, a path of modules, or an operator's name.
     ///
-    /// An exporter that gets fewer names than outputs names the first outputs and numbers the rest. A first output named `output` is then not
-    /// necessarily the image (for Zero-DCE it is not).
+    /// An exporter that gets fewer names than outputs names the first outputs and numbers the rest. A first output named `output` is then
+    /// not necessarily the image (for Zero-DCE it is not).
     pub(crate) fn is_numbered(&self) -> bool {
         const OPERATORS: [&str; 19] = [
             "add", "cat", "clamp", "clip", "concat", "conv", "conv2d", "div", "getitem",

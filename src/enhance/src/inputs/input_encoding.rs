@@ -1,7 +1,7 @@
 //! Conversion of an image of bytes to a model's input tensor: [`InputEncoding`].
 //!
-//! Usually in one pass: a table of 256 values per channel combines range, mean and standard deviation. With an expression, or for a model of
-//! the luma, the image is converted to floats first; then `input`, channels, range, mean and deviation apply in this order.
+//! Usually in one pass: a table of 256 values per channel combines range, mean and standard deviation. With an expression, or for a model
+//! of the luma, the image is converted to floats first; then `input`, channels, range, mean and deviation apply in this order.
 
 use half::f16;
 

@@ -31,8 +31,8 @@ pub(super) fn is_library_name(os: &str, name: &str) -> bool {
 
 /// Checks a library's file, loads it, gets its version and unloads it; returns the version.
 ///
-/// Only complete libraries that export ONNX Runtime's entry point are loaded, so libraries of custom operators are not. The API is requested
-/// here already, because `ort` panics if a library does not provide it.
+/// Only complete libraries that export ONNX Runtime's entry point are loaded, so libraries of custom operators are not. The API is
+/// requested here already, because `ort` panics if a library does not provide it.
 ///
 /// # Errors
 /// A message about the fault, to follow the library's path.

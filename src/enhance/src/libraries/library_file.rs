@@ -143,8 +143,8 @@ impl<F: Read + Seek> Header<'_, F> {
         self.bytes(at).map(u64::from_le_bytes)
     }
 
-    /// Minimum size of an ELF library: the end of its last table or segment. ONNX Runtime's releases end with the section table, so even one
-    /// missing byte is detected.
+    /// Minimum size of an ELF library: the end of its last table or segment. ONNX Runtime's releases end with the section table, so even
+    /// one missing byte is detected.
     fn elf(&mut self, arch: &str) -> Result<u64, HeaderError> {
         // Magic, 64 bits, little-endian; ET_DYN is 3.
         if self.bytes::<6>(0)? != *b"\x7fELF\x02\x01" || self.u16(16)? != 3 {

@@ -1,8 +1,8 @@
 //! Integrity check of the installed library with a receipt: [`check`].
 //!
-//! The header of a library shows that it is complete ([`super::library_file`]), but not that its bytes are unchanged. So a file next to the
-//! installed library records its SHA-256, size and time of modification. The library (29 MB) is hashed again only if size or time differ from
-//! this receipt.
+//! The header of a library shows that it is complete ([`super::library_file`]), but not that its bytes are unchanged. So a file next to
+//! the installed library records its SHA-256, size and time of modification. The library (29 MB) is hashed again only if size or time
+//! differ from this receipt.
 
 use std::fs::{self, File};
 use std::io::{self, Read};

@@ -77,8 +77,8 @@ impl RuntimeThread {
     /// Runs a job. If it exceeds its `limits`, `stop` is called and must make it end.
     ///
     /// # Errors
-    /// If the job does not end within [`PATIENCE`] times the time limit, or within 10 s after it exceeded the memory limit. The thread is then
-    /// stuck, and every later job is refused.
+    /// If the job does not end within [`PATIENCE`] times the time limit, or within 10 s after it exceeded the memory limit. The thread is
+    /// then stuck, and every later job is refused.
     pub(crate) fn run_within<T: Send + 'static>(
         &self,
         limits: JobLimits,

@@ -117,7 +117,8 @@ impl SearchFolders {
             .collect()
     }
 
-    /// Folders of Python packages of ONNX Runtime without a separate library. Before version 1.19, the library is part of the Python module.
+    /// Folders of Python packages of ONNX Runtime without a separate library. Before version 1.19, the library is part of the Python
+    /// module.
     pub(super) fn packages_without_library(&self) -> Vec<PathBuf> {
         let mut empty: Vec<PathBuf> = [LibraryPlace::Environment, LibraryPlace::Python]
             .into_iter()

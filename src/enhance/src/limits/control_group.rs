@@ -1,7 +1,7 @@
 //! Memory that the Linux control groups (cgroups) of this process still allow: [`unused_memory`].
 //!
-//! Batch systems and containers limit memory by a control group, and the kernel kills processes that exceed the limit. The limited group can
-//! be an ancestor of the process's own group, so all ancestors are checked.
+//! Batch systems and containers limit memory by a control group, and the kernel kills processes that exceed the limit. The limited group
+//! can be an ancestor of the process's own group, so all ancestors are checked.
 
 use std::fs;
 use std::path::{Component, Path, PathBuf};

@@ -38,8 +38,8 @@ impl MemoryCost {
         }
     }
 
-    /// Cost from the pixels of the last three probes and the resident bytes after each; `None` if the memory did not grow, or for fewer than
-    /// two probes. With two probes, all growth counts as quadratic, because that is why a third one was skipped.
+    /// Cost from the pixels of the last three probes and the resident bytes after each; `None` if the memory did not grow, or for fewer
+    /// than two probes. With two probes, all growth counts as quadratic, because that is why a third one was skipped.
     pub(super) fn from_probes(measured: &[(usize, u64)]) -> Option<Self> {
         let points: Vec<(f64, f64)> = measured[measured.len().saturating_sub(3)..]
             .iter()

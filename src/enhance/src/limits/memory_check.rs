@@ -1,7 +1,7 @@
 //! Check before a large run that enough memory is free: [`MemoryCheck`].
 //!
-//! The estimate is based on the size of the input tensor, not on that of the image: a wrong multiple or fixed size in a sidecar can make the
-//! input much larger. The check is made before memory is allocated.
+//! The estimate is based on the size of the input tensor, not on that of the image: a wrong multiple or fixed size in a sidecar can make
+//! the input much larger. The check is made before memory is allocated.
 
 use super::memory::{self, MemoryCost, PROBE_SIDES};
 use crate::conventions::Locality;
@@ -31,8 +31,8 @@ impl MemoryCheck {
         Self(Estimate::Unknown)
     }
 
-    /// Checks a run with an input of height and width `fed` for an image of `size`. The inner error is a message with the needed and the free
-    /// memory, and a remedy.
+    /// Checks a run with an input of height and width `fed` for an image of `size`. The inner error is a message with the needed and the
+    /// free memory, and a remedy.
     pub(crate) fn run(
         &mut self,
         graph: &Graph,

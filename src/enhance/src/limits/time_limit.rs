@@ -13,7 +13,8 @@ pub struct TimeLimit(Option<Duration>);
 /// Number of images in a row that exceed a limit of time or memory after which the enhancer is not run any more; chosen.
 pub(crate) const MAX_CONSECUTIVE_OVERRUNS: usize = 3;
 
-/// Multiple of the time limit after which a stopped run counts as stuck; chosen. ONNX Runtime ends a run only between two nodes of its graph.
+/// Multiple of the time limit after which a stopped run counts as stuck; chosen. ONNX Runtime ends a run only between two nodes of its
+/// graph.
 pub(crate) const PATIENCE: u32 = 10;
 
 impl TimeLimit {

@@ -1,7 +1,7 @@
 //! Computation of the enhanced image from the outputs of a run: [`Composition`].
 //!
-//! Most models return the image itself, which is decoded to bytes in one pass. For an expression of outputs, or a model of the luma, outputs
-//! are decoded to floats; then `image` is evaluated, the chroma added, and the result clamped and rounded.
+//! Most models return the image itself, which is decoded to bytes in one pass. For an expression of outputs, or a model of the luma,
+//! outputs are decoded to floats; then `image` is evaluated, the chroma added, and the result clamped and rounded.
 
 use super::output::INPUT;
 use super::output_decoding::{

@@ -253,7 +253,8 @@ impl OutputDecoding {
 
 /// Refuses NaN, and values that do not fit the assumed range.
 ///
-/// Models that do not clamp their output overshoot a little. So the range counts as wrong only if more than one sample in 20 is far outside.
+/// Models that do not clamp their output overshoot a little. So the range counts as wrong only if more than one sample in 20 is far
+/// outside.
 pub(super) fn check_values(
     values: &[f32],
     range: ValueRange,

@@ -272,8 +272,8 @@ fn swapped(order: ChannelOrder) -> ChannelOrder {
     }
 }
 
-/// Conventions to draw: the plausible ones and the one that a run would use (`stated`), or all if none is plausible. `output` is a prefix of
-/// the titles that names the output.
+/// Conventions to draw: the plausible ones and the one that a run would use (`stated`), or all if none is plausible. `output` is a prefix
+/// of the titles that names the output.
 fn conventions_to_draw(
     output: &str,
     probe: &Probe,

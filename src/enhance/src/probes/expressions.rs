@@ -11,8 +11,8 @@ use crate::outputs::{expression_name, light_map_line};
 use darkqa_ground::error::Result;
 use darkqa_ground::types::{Flaw, Rgb};
 
-/// Threshold in codes, chosen. An output up to it for white may be a residual, and one whose difference between white and black is up to it may
-/// be a map. Models that return the image itself exceed 230.
+/// Threshold in codes, chosen. An output up to it for white may be a residual, and one whose difference between white and black is up to
+/// it may be a map. Models that return the image itself exceed 230.
 const MIN_CONTRAST: f64 = 64.0;
 
 /// Expressions that may give the image, with the kind of output that they suit. `OUTPUT` is the placeholder of the output's name.

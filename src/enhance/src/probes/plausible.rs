@@ -1,8 +1,8 @@
 //! Plausibility of an enhanced image, compared with the dark one: [`judge`].
 //!
 //! The rules detect outputs that are decoded in a wrong way: another range, the wrong output, swapped colours or dimensions. They do not
-//! judge the quality of an enhancement. Their thresholds were set on 9 trained models with 25 dark images each, so that none of these models
-//! is flagged; `src/docs/enhance.md` lists the faults that they find and miss.
+//! judge the quality of an enhancement. Their thresholds were set on 9 trained models with 25 dark images each, so that none of these
+//! models is flagged; `src/docs/enhance.md` lists the faults that they find and miss.
 
 use std::fmt;
 
@@ -18,8 +18,8 @@ pub const DARK: f64 = 64.0;
 const JUDGED_SIDE: usize = 160;
 /// Share of the pixels that count as the darkest.
 const DARKEST_SHARE: f64 = 0.01;
-/// Factor by which the ratio of the darkest pixels to the mean must exceed that of the dark frame for a haze; chosen. Dimming hardly changes
-/// the ratio, because the curve of the codes is nearly a power, and noise changes it less than this factor.
+/// Factor by which the ratio of the darkest pixels to the mean must exceed that of the dark frame for a haze; chosen. Dimming hardly
+/// changes the ratio, because the curve of the codes is nearly a power, and noise changes it less than this factor.
 const HAZE_RATIO: f64 = 1.5;
 /// Mean difference between the channels of blocks, in codes, above which a dark frame is coloured; chosen above the effect of noise.
 const MIN_COLOUR: f64 = 1.0;

@@ -17,27 +17,26 @@ use darkqa_ground::error::Result;
 use darkqa_ground::types::manifests::{ProbeNote, ProbeOutcome};
 use darkqa_ground::types::{Flaw, Rgb};
 
-/// Sizes that are tried one after another, longer and shorter side in pixels: most multiples that models need divide one of them.
+/// Sizes of probe frames, tried in this order; longer and shorter side in pixels. Most multiples that models need divide one of them.
 const SIZES: [[usize; 2]; 3] = [[144, 96], [160, 120], [128, 128]];
 
 /// Results of a model on dark frames.
 pub(super) struct Trials<const N: usize> {
-    /// The frames as they were fed.
+    /// The frames, in the size in which they were fed.
     pub(super) frames: Vec<Rgb>,
     /// Results by convention.
     pub(super) probes: [Probe; N],
 }
 
 impl Enhancer {
-    /// Tries the model on dark frames, and decides in which value ranges it is fed and read where they are not stated.
+    /// Runs the model on dark frames, and chooses the value ranges that are not stated.
     ///
     /// # Errors
-    /// If its images are implausible, or several ranges would do, with the lines of a sidecar that would repair it; not if
-    /// implausible images are used.
+    /// If the images are implausible or the ranges ambiguous, unless implausible images are accepted. The message proposes sidecar lines.
     pub fn probe(&mut self, dark: &[Rgb], implausible: Implausible) -> Result<()> {
         let mut trials = self.trials(dark, [self.convention()], self.stated_ranges())?;
         if let (None, Some(frame)) = (&trials, dark.first()) {
-            // It may take the size of a frame, or show which sizes it takes.
+            // The model may accept the frame's own size, or its accepted sizes are found by trial.
             self.enhance(frame)?;
             trials = self.trials(dark, [self.convention()], self.stated_ranges())?;
         }
@@ -83,16 +82,16 @@ impl Enhancer {
         self.set_probe_result(note)
     }
 
-    /// Flaw of a probe's images, with a remedy; `None` if they are plausible. If lines of the sidecar are wrong, the right ones are found
-    /// by trial.
+    /// Message about the flaw of a probe's images, with a remedy; `None` if they are plausible. Without a preset, corrected sidecar lines
+    /// are searched by trial.
     fn problem(&self, probe: &Probe, dark: &[Rgb]) -> Result<Option<String>> {
         let problem = match probe.conclusion() {
-            // The convention of a preset's authors is not contradicted.
+            // A preset's convention comes from the authors' code, so no other one is proposed.
             Conclusion::Implausible(seen) | Conclusion::Doubtful(seen)
                 if !self.follows_preset() =>
             {
                 let better = match (self.better_lines(dark)?, seen.example.flaw) {
-                    // Noise, as of random weights, is no residual and no map.
+                    // Noise, such as the output of random weights, is neither a residual nor a map.
                     (None, Flaw::Shuffled) => None,
                     (None, flaw) => self.better_expression(dark, flaw)?,
                     (lines, _) => lines,
@@ -117,7 +116,7 @@ impl Enhancer {
         )))
     }
 
-    /// The output that is read, as a term of a sidecar's expression.
+    /// The present image output, as a term of an expression.
     fn read_output(&self) -> String {
         match &self.graph().convention.image {
             Some(image) => format!("({image})"),
@@ -125,10 +124,10 @@ impl Enhancer {
         }
     }
 
-    /// Enhances a frame in a condition, and looks at the result; with what its note got from it.
+    /// Enhances the image of a frame and condition (`place`), judges the result, and returns it with its contribution to the usage record.
     ///
     /// # Errors
-    /// As by [`Self::enhance`], and if most of its images of dark frames so far are implausible.
+    /// As [`Self::enhance`], and if most images of dark frames so far are implausible.
     pub fn enhance_and_judge(
         &mut self,
         image: &Rgb,
@@ -138,7 +137,7 @@ impl Enhancer {
         let before = self.sizes().clone();
         let enhanced = self.enhance(image)?;
         let used = ImageUse {
-            // Looked at in any case: another run may read the image from a store and look for such images.
+            // Judged in any case, because another run that reads the image from a store may need the judgement.
             seen: Judgement::on([image, &enhanced]),
             sizes: self.sizes().since(&before),
         };
@@ -146,10 +145,10 @@ impl Enhancer {
         Ok((enhanced, used))
     }
 
-    /// Notes an image of a frame in a condition that it made in another run or process, as if it was made now.
+    /// Records an image of a frame and condition (`place`) from another run or process, as if it was enhanced now.
     ///
     /// # Errors
-    /// If most of its images of dark frames so far are implausible.
+    /// If most images of dark frames so far are implausible.
     pub fn judge_stored(
         &self,
         used: &ImageUse,
@@ -168,9 +167,9 @@ impl Enhancer {
         seen.record(&self.usage(), self.path(), place, implausible)
     }
 
-    /// Runs the model on dark frames by each of these conventions, which differ in how the output is read, and with each pair of ranges
-    /// that is not stated. Where the usual pair is implausible, pairs with a mean and a deviation are tried too, and all are ranked by the
-    /// output for black and white. Returns `None` if the model fails at all sizes that are tried.
+    /// Runs the model on dark frames in each of these conventions, which differ only in the decoding of the output, with each pair of
+    /// ranges that the stated ones allow. If the usual pair is implausible, normalised pairs are tried, too, and all are ranked by the
+    /// outputs for black and white. Returns `None` if the model fails at all sizes of the probe.
     pub(super) fn trials<const N: usize>(
         &self,
         dark: &[Rgb],
@@ -203,7 +202,7 @@ impl Enhancer {
                 if !self.is_dim(&probes[0], conventions[0])? && self.may_be_normalised(input) {
                     let pairs = RangePair::normalised(input, output);
                     for fed_alike in pairs.chunk_by(|a, b| a.input == b.input) {
-                        // The sizes are those of the plain ranges, so what fails here is no reason to try others.
+                        // The plain ranges have shown that this size works, so a failure here is no reason to try another.
                         let more = self.pair_trials(&frames, conventions, fed_alike)?;
                         for (probe, pairs) in probes.iter_mut().zip(more.into_iter().flatten()) {
                             probe.pairs.extend(pairs);
@@ -219,7 +218,7 @@ impl Enhancer {
         Ok(None)
     }
 
-    /// Whether the images in the usual ranges are merely dim: not brighter, but with black and white near to themselves.
+    /// True if the images in the usual ranges are merely dim: not brighter, but with black and white preserved.
     fn is_dim(&self, probe: &Probe, convention: &ModelSidecar) -> Result<bool> {
         let verdict = probe.usual_pair().and_then(PairTrial::verdict);
         if verdict.is_none_or(|seen| seen.example.flaw != Flaw::Unlit) {
@@ -229,7 +228,7 @@ impl Enhancer {
         Ok(endpoints.is_some_and(Endpoints::are_near))
     }
 
-    /// Images of the frames by each of these conventions, with each pair of ranges. The model runs once for each frame and input range.
+    /// Trials of the frames in each of these conventions with each pair of ranges. The model runs once for each frame and input range.
     /// Returns `None` if it fails on a frame.
     fn pair_trials<const N: usize>(
         &self,
@@ -260,7 +259,7 @@ impl Enhancer {
         Ok(Some(pairs))
     }
 
-    /// Ranks the pairs of a probe by the output for black and white, which is measured for the plausible ones.
+    /// Measures the outputs for black and white of the plausible pairs, and ranks the pairs by them.
     fn rank(&self, probe: &mut Probe, convention: &ModelSidecar) -> Result<()> {
         for pair in &mut probe.pairs {
             if pair.verdict().is_none() {
@@ -271,7 +270,7 @@ impl Enhancer {
         Ok(())
     }
 
-    /// Warns that nothing states the value ranges. Lines that confirm them are proposed if the output seems to be the image.
+    /// Warns that the value ranges are assumed. If the output seems to be the image, the message proposes lines that confirm them.
     fn warn_ranges_assumed(&self, usual: RangePair, is_image: bool) {
         let lines = if is_image {
             format!(". To confirm, {ADD}: {}", usual.stated())
@@ -285,8 +284,7 @@ impl Enhancer {
         tracing::warn!("{}: {words}", self.name());
     }
 
-    /// The output for black and white by a convention with these ranges; `None` if the model fails on the image or its output has values
-    /// that are not finite.
+    /// Outputs for black and white in a convention with these ranges; `None` if the model fails or its output is not finite.
     ///
     /// # Errors
     /// If the runtime fails.
@@ -303,7 +301,7 @@ impl Enhancer {
         Ok(endpoints.filter(|endpoints| endpoints.distance.is_finite()))
     }
 
-    /// The model, fed and read by a convention with these ranges.
+    /// The model's graph in a convention with these ranges.
     pub(super) fn read_by(&self, convention: &ModelSidecar, ranges: RangePair) -> Result<Graph> {
         let convention = convention
             .clone()
@@ -313,7 +311,7 @@ impl Enhancer {
         graph.map_err(|problem| self.error(problem))
     }
 
-    /// A frame in a size of the probe, or in the size that the graph fixes.
+    /// A frame resized to a size of the probe, or to the model's fixed size.
     pub(super) fn probe_image(&self, frame: &Rgb, [longer, shorter]: [usize; 2]) -> Result<Rgb> {
         let size = if frame.height() > frame.width() {
             [longer, shorter]

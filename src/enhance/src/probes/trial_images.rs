@@ -1,11 +1,12 @@
-//! Images that a model makes of the frames of a trial: [`run_frames`].
+//! Outputs of a model for the frames of a trial: [`run_frames`].
 
 use super::plausible::UnclampedImage;
 use crate::graphs::{Graph, RunResult};
 use darkqa_ground::error::Result;
 use darkqa_ground::types::Rgb;
 
-/// Outputs of a model for each frame, read by each of these graphs, which share the input; `None` if it fails on a frame.
+/// Runs a model on frames, and decodes the outputs by the conventions of several graphs with the same input encoding. Returns the outputs
+/// by graph and frame; `None` if the model fails on a frame.
 pub(super) fn run_frames(
     graphs: &[Graph],
     frames: &[Rgb],
@@ -19,7 +20,7 @@ pub(super) fn run_frames(
         let decodings = match graph.run_with_conventions(frame, graphs)? {
             RunResult::Output(decodings) => decodings,
             RunResult::Failed(_) => return Ok(None),
-            // The rules about plausible images name it.
+            // The plausibility rules then report the flaw.
             RunResult::Unusable(_) => {
                 vec![UnclampedImage::not_a_number([frame.height(), frame.width()]); graphs.len()]
             }

@@ -1,4 +1,4 @@
-//! Counters of an enhancer in a run, shared by all threads that use it ([`Usage`]), and the reaction to implausible images
+//! Record of an enhancer's convention and counts in a run, shared by all threads ([`Usage`]), and the reaction to implausible images
 //! ([`Implausible`]).
 
 use std::collections::{BTreeMap, HashSet};
@@ -12,30 +12,30 @@ use darkqa_ground::error::{Error, Result};
 use darkqa_ground::types::manifests::{ConventionLine, ELSEWHERE, EnhancerNote, FlawedImage};
 use darkqa_ground::types::{Digest, Rgb, SizeLog};
 
-/// Number of dark images from which on a verdict on the enhancer is possible; chosen as the number of frames of the probe.
+/// Minimum number of dark images for a verdict on the enhancer; chosen as the number of frames of the probe.
 const MIN_JUDGED: usize = super::probe::FRAMES;
-/// Number of the twin that stands for images that were read from a store.
+/// Index in place of a twin's for images that were read from a store.
 const STORED_TWIN: usize = usize::MAX;
 
 /// Reaction to a model with implausible images.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Implausible {
-    /// It is refused.
+    /// Refuse the model.
     #[default]
     Refused,
-    /// It is used (`--allow bad-enhancer`).
+    /// Use the model (`--allow bad-enhancer`).
     Used,
-    /// Its images are not looked at, because they are those of a run that is there.
+    /// Do not judge images, because they belong to a finished run.
     NotLookedFor,
 }
 
-/// Finding about one enhanced image.
+/// Judgement of one enhanced image.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(super) enum Judgement {
-    /// It was not looked at, because the degraded image is not dark: good models fail the rules on those.
+    /// Not judged, because the degraded image is bright; good models fail the rules on bright images.
     #[default]
     Bright,
-    /// The degraded image is dark. Holds the flaw of the enhanced one, if it has one.
+    /// Flaw of the enhanced image, if any; the degraded image is dark.
     Dark(Option<Verdict>),
 }
 
@@ -53,7 +53,7 @@ impl Judgement {
     }
 }
 
-/// Contribution of one image to the enhancer's note; stored with the image.
+/// Contribution of one image to the enhancer's usage record; stored with the image.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ImageUse {
     pub(super) seen: Judgement,
@@ -62,7 +62,7 @@ pub struct ImageUse {
 }
 
 impl ImageUse {
-    /// Notes an image of a frame in a condition that was made in another run or process, as if the enhancer in this file made it now.
+    /// Records an image of a frame and condition (`place`) from another run or process, as if the enhancer in the file `model` made it now.
     ///
     /// # Errors
     /// If most of its images of dark frames so far are implausible.
@@ -79,7 +79,7 @@ impl ImageUse {
 }
 
 impl ImageUse {
-    /// The use of an image that was enhanced elsewhere, made of a degraded one.
+    /// Contribution of an image that another program enhanced.
     #[must_use]
     pub fn for_external([degraded, made]: [&Rgb; 2]) -> Self {
         Self {
@@ -88,10 +88,10 @@ impl ImageUse {
         }
     }
 
-    /// Notes an image of a frame in a condition that was enhanced elsewhere.
+    /// Records an image of a frame and condition (`place`) that another program enhanced.
     ///
     /// # Errors
-    /// If most images of dark frames so far are implausible; names the folder.
+    /// If most images of dark frames so far are implausible; the message names the folder.
     pub fn record_external(
         &self,
         usage: &Usage,
@@ -108,7 +108,7 @@ impl ImageUse {
 }
 
 impl Judgement {
-    /// Counts the finding about a frame's image in a condition, unless images are not checked. The model is named by its file.
+    /// Counts the judgement of the image of a frame and condition (`place`), unless images are not judged.
     ///
     /// # Errors
     /// If most images of dark frames so far are implausible.
@@ -127,7 +127,7 @@ impl Judgement {
     }
 }
 
-/// What to do about an enhancer whose images are implausible, as a sentence.
+/// Sentence with the options for an enhancer whose images are implausible.
 pub(super) fn doctor_advice(model: &Path) -> String {
     format!(
         "`darkqa-eval enhance doctor {} IMAGES… --out DIR` tries each value range and colour order; --allow bad-enhancer uses it anyway",
@@ -135,23 +135,23 @@ pub(super) fn doctor_advice(model: &Path) -> String {
     )
 }
 
-/// A handle to the note of an enhancer, which grows while it is used.
+/// Shared handle to the usage record of an enhancer, which is updated with each image.
 #[derive(Debug, Clone, Default)]
 pub struct Usage(Arc<Mutex<UsageState>>);
 
 #[derive(Debug, Default)]
 struct UsageState {
     note: EnhancerNote,
-    /// Number of images that are implausible.
+    /// Number of images whose flaw is impossible.
     impossible: usize,
-    /// The digests of the frames and conditions whose images were looked at.
+    /// Digests of the frames and conditions whose images were judged.
     judged: HashSet<Digest>,
     /// Size adaptations by twin.
     sizes: BTreeMap<usize, SizeLog>,
 }
 
 impl Usage {
-    /// The handle of images that were enhanced elsewhere.
+    /// A usage record for images that another program enhanced.
     #[must_use]
     pub fn for_external() -> Self {
         let usage = Self::default();
@@ -165,12 +165,12 @@ impl Usage {
         usage
     }
 
-    /// The note as it is now.
+    /// Copy of the record's present state.
     pub fn note(&self) -> EnhancerNote {
         self.with(|state| state.note.clone())
     }
 
-    /// Notes what a twin did so far because of sizes.
+    /// Sets the counts of whole, padded and tiled images of a twin.
     pub(crate) fn set_sizes(&self, twin: usize, log: &SizeLog) {
         self.change_sizes(twin, |sizes| sizes.clone_from(log));
     }
@@ -186,25 +186,25 @@ impl Usage {
         });
     }
 
-    /// Adds the size adaptations of an image that was made earlier and is read now.
+    /// Adds the counts of an image that was read from a store.
     pub(super) fn add_sizes_of_stored(&self, log: &SizeLog) {
         self.change_sizes(STORED_TWIN, |sizes| sizes.add(log));
     }
 
-    /// Resets the size adaptations of stored images.
+    /// Resets the counts of stored images.
     pub(crate) fn reset_stored_counts(&self) {
         self.set_sizes(STORED_TWIN, &SizeLog::default());
     }
 
-    /// Changes the note.
+    /// Changes the record.
     pub(crate) fn update(&self, change: impl FnOnce(&mut EnhancerNote)) {
         self.with(|state| change(&mut state.note));
     }
 
-    /// Counts the finding about a frame's image in a condition; an image that is made again counts once.
+    /// Counts the judgement of an image. An image of the same frame and condition counts once.
     ///
     /// # Errors
-    /// The finding, if more than half of at least six images are implausible, unless such images are used.
+    /// A message, if more than half of at least six images are implausible and such images are refused.
     pub(super) fn judge(
         &self,
         seen: &Judgement,
@@ -256,7 +256,7 @@ impl Usage {
 mod tests {
     use super::*;
 
-    /// An image of squares of different light, `gain` times as bright.
+    /// An image of squares of different brightness, multiplied by `gain`.
     fn squares(gain: f32) -> Rgb {
         let samples = (0..96 * 96).flat_map(|place| {
             let light = (place / 12 % 8 * 5 + place / 1152 * 3) as f32;

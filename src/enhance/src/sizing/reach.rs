@@ -1,8 +1,8 @@
 //! Measurement of a model's receptive field ([`Reach`]), and of the context and alignment of its tiles ([`Context`]).
 //!
 //! One pixel in the middle of a trial image is changed by one code. The distance of the farthest output sample that changes is the reach:
-//! 7 pixels for Zero-DCE, as its seven 3 × 3 convolutions imply. A global mean changes too little with one pixel (2 · 10⁻⁷ for BrightsightNet
-//! at 512 × 512). So a quarter of the image is inverted, too, and changes far from that quarter also count.
+//! 7 pixels for Zero-DCE, as its seven 3 × 3 convolutions imply. A global mean changes too little with one pixel (2 · 10⁻⁷ for
+//! BrightsightNet at 512 × 512). So a quarter of the image is inverted, too, and changes far from that quarter also count.
 
 use super::size_plan::SizeRule;
 use super::texture::{CODES, texture};
@@ -79,8 +79,8 @@ impl Context {
         self.alignment.is_none()
     }
 
-    /// Multiple at which tiles of this height and width must start to give the same result as the whole image: 2 to the power of the number of
-    /// pooling layers. 1 if none is found; the comparison of seams then detects wrong tiles.
+    /// Multiple at which tiles of this height and width must start to give the same result as the whole image: 2 to the power of the
+    /// number of pooling layers. 1 if none is found; the comparison of seams then detects wrong tiles.
     pub(crate) fn measure_alignment(
         &mut self,
         graph: &Graph,

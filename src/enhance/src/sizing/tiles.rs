@@ -158,8 +158,8 @@ impl TilePlan {
     }
 }
 
-/// Tiles along one side, all of the same length and within the image. Each edge of a tile is an edge of the image, or is separated from the used
-/// part by the context. `None` if the context leaves no used part.
+/// Tiles along one side, all of the same length and within the image. Each edge of a tile is an edge of the image, or is separated from
+/// the used part by the context. `None` if the context leaves no used part.
 fn spans(length: usize, tile: usize, context: usize, multiple: usize) -> Option<Vec<TileSpan>> {
     let tile = tile.min(length);
     let step = tile.checked_sub(2 * (context + GUARD));
