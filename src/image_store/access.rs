@@ -1,4 +1,4 @@
-//! Reading and writing images of a store: [`ImageStore`].
+//! Reads and writes of an image store: [`ImageStore`].
 
 use std::fs;
 use std::io::{self, Read as _, Seek as _, SeekFrom};
@@ -7,8 +7,8 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, SystemTime};
 
 use super::counts::StoreCounts;
-use super::entry::{Content, Damaged, Entry, FOOTER, fits};
-use super::folder::{StoreFolder, found};
+use super::entry::{Content, Damaged, Entry, FOOTER, is_footer_valid};
+use super::folder::{StoreFolder, if_exists};
 use super::key::Key;
 use super::kinds::StoredKinds;
 use super::sweep::sweep;
@@ -16,137 +16,140 @@ use crate::error::{Error, Result};
 use crate::files::folder_access::FolderAccess;
 use crate::files::reading;
 
-/// Bytes after which the store is counted and swept again, at most; chosen.
+/// Maximum number of written bytes between two sweeps; chosen.
 const SWEEP_AFTER: u64 = 1_000_000_000;
-/// The same as a share of the room, for small stores; chosen.
+/// Divisor of the store's capacity that gives the bytes between two sweeps of a small store; chosen.
 const SWEEP_SHARE: u64 = 8;
-/// The most bytes of a file that is read; chosen: an image of 100 megapixels has a third.
-const MOST_BYTES: u64 = 1 << 30;
-/// Time from which on the use of an image is noted again: once a day, so that reading writes little.
-const NOTED: Duration = Duration::from_hours(24);
+/// Maximum size, in bytes, of a file that is read; chosen (an image of 100 megapixels has a third).
+const MAX_BYTES: u64 = 1 << 30;
+/// Age of a file's time from which on a read updates it: a day, so that reads cause few writes.
+const TOUCH_AFTER: Duration = Duration::from_hours(24);
 
-/// A folder of images that other runs and processes share. Threads may share it, too.
+/// A folder of images that is shared with other runs, processes and threads.
 #[derive(Debug)]
 pub(crate) struct ImageStore {
-    /// The folder as the user named it.
-    named: PathBuf,
+    /// The folder as the user wrote it.
+    argument: PathBuf,
     folder: StoreFolder,
     kinds: StoredKinds,
-    /// Room for all files, in bytes.
-    most: u64,
-    state: Mutex<State>,
+    /// Maximum size of all files together, in bytes.
+    capacity: u64,
+    state: Mutex<StoreState>,
 }
 
 #[derive(Debug, Default)]
-struct State {
+struct StoreState {
     counts: StoreCounts,
     /// Bytes in the store, as far as this process knows.
     bytes: u64,
-    /// Bytes that were to be written since the last sweep.
+    /// Bytes offered for writing since the last sweep.
     offered: u64,
     health: Health,
 }
 
-/// The remaining uses of the store.
+/// Usability of the store, from best to worst. The user is warned when it gets worse.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 enum Health {
     #[default]
-    Whole,
-    /// It cannot be written to any more, and the user knows it.
+    Usable,
+    /// Writing has failed.
     ReadOnly,
-    /// It cannot be read any more, and the user knows it.
-    Gone,
+    /// Reading has failed.
+    Unusable,
 }
 
 impl ImageStore {
-    /// A store in a folder, which is made with such access if it is not there. It holds such images, `most` bytes of them.
+    /// Opens a store of at most `capacity` bytes, and sweeps it. A missing folder is created with this access.
     ///
     /// # Errors
-    /// If the folder cannot be made or read.
+    /// If the folder cannot be created or read.
     pub(crate) fn open(
         folder: &Path,
         access: FolderAccess,
         kinds: StoredKinds,
-        most: u64,
+        capacity: u64,
     ) -> Result<Self> {
         let store = Self {
-            named: folder.to_owned(),
+            argument: folder.to_owned(),
             folder: StoreFolder::new(folder, access),
             kinds,
-            most,
+            capacity,
             state: Mutex::default(),
         };
-        let unusable = |e: io::Error| {
-            let folder = folder.display();
-            let problem = format_args!(
-                "cannot use the folder {folder}: {e}; name a folder that can be written to, or leave the flag out"
-            );
-            Error::usage("--images-cache", problem)
-        };
-        store.folder.make().map_err(unusable)?;
-        let swept = sweep(&store.folder, most, SystemTime::now()).map_err(unusable)?;
-        store.with(|state| {
+        let swept = store
+            .folder
+            .create()
+            .and_then(|()| sweep(&store.folder, capacity, SystemTime::now()))
+            .map_err(|e| {
+                let folder = folder.display();
+                let problem = format_args!(
+                    "cannot use the folder {folder}: {e}; name a folder that can be written to, or leave the flag out"
+                );
+                Error::usage("--images-cache", problem)
+            })?;
+        store.with_state(|state| {
             state.bytes = swept.bytes;
             state.counts.evicted = swept.evicted;
         });
         Ok(store)
     }
 
-    /// Which images it keeps.
+    /// Kinds of images that the store keeps.
     pub(crate) fn kinds(&self) -> StoredKinds {
         self.kinds
     }
 
     /// Images read and written so far, as a line for `--timings`.
     pub(crate) fn summary(&self) -> String {
-        let (counts, bytes) = self.with(|state| (state.counts, state.bytes));
-        let (folder, gigabytes) = (self.named.display(), |bytes: u64| bytes as f64 / 1e9);
-        let (held, most) = (gigabytes(bytes), gigabytes(self.most));
+        let (counts, bytes) = self.with_state(|state| (state.counts, state.bytes));
+        let folder = self.argument.display();
+        let [held, most] = [bytes, self.capacity].map(|bytes| bytes as f64 / 1e9);
         format!("image store {folder}: {counts}; it holds {held:.2} of {most} GB")
     }
 
     #[cfg(test)]
     pub(super) fn counts(&self) -> StoreCounts {
-        self.with(|state| state.counts)
+        self.with_state(|state| state.counts)
     }
 
-    /// Whether the store has a file of this key. It may be damaged.
+    /// True if the store has a file for this key, which may be damaged.
     pub(crate) fn contains(&self, key: &Key) -> bool {
-        self.with(|state| state.health) != Health::Gone && self.folder.place(key.digest()).is_file()
+        self.with_state(|state| state.health) != Health::Unusable
+            && self.folder.path(key.digest()).is_file()
     }
 
-    /// The entry of a key; `None` if the store has none. A damaged one is removed. `is_enough` states whether an entry has all that is
-    /// needed, else it counts as missing. Only images are counted as read or missing.
+    /// Reads the entry of a key; `None` if it is missing. A damaged entry is removed and counts as missing, like an entry for which
+    /// `is_sufficient` is false. Hits and misses are counted for images only.
     pub(crate) fn get(
         &self,
         key: &Key,
         content: Content,
-        is_enough: impl FnOnce(&Entry) -> bool,
+        is_sufficient: impl FnOnce(&Entry) -> bool,
     ) -> Option<Entry> {
-        if self.with(|state| state.health) == Health::Gone {
+        if self.with_state(|state| state.health) == Health::Unusable {
             return None;
         }
-        let place = self.folder.place(key.digest());
-        let entry = match found(read(&place)) {
+        let place = self.folder.path(key.digest());
+        let entry = match if_exists(read(&place)) {
             Ok(None) => None,
             Ok(Some(file)) => {
-                let entry = file.and_then(|file| Entry::read(key, file));
+                let entry = file.and_then(|file| Entry::decode(key, file));
                 if entry.is_err() {
                     self.remove_damaged(&place);
                 }
-                entry.ok().filter(is_enough)
+                entry.ok().filter(is_sufficient)
             }
             Err(e) => {
-                self.fails(Health::Gone, "read", &e);
+                self.degrade(Health::Unusable, "read", &e);
                 None
             }
         };
-        self.with(|state| match (content, &entry) {
-            (Content::Measures | Content::Probe | Content::Thumbnail, found) => {
-                let found = found.as_ref();
-                state.counts.facts += usize::from(found.is_some());
-                state.counts.saved_ms += found.map_or(0, |entry| entry.facts.milliseconds);
+        self.with_state(|state| match (content, &entry) {
+            (Content::Measures | Content::Probe | Content::Thumbnail, Some(entry)) => {
+                state.counts.facts += 1;
+                state.counts.saved_ms += entry.facts.milliseconds;
             }
+            (Content::Measures | Content::Probe | Content::Thumbnail, None) => {}
             (Content::Image, Some(entry)) => {
                 state.counts.hits += 1;
                 state.counts.hit_bytes += entry.image.len() as u64;
@@ -157,12 +160,12 @@ impl ImageStore {
         entry
     }
 
-    /// Removes a damaged file; the first one is named in a warning.
+    /// Removes a damaged file, with a warning about the first one.
     fn remove_damaged(&self, place: &Path) {
         let bytes = place.symlink_metadata().map_or(0, |file| file.len());
-        // If it cannot be removed, the image that is made now replaces it.
+        // If removal fails, the image that is computed now replaces the file.
         let _ = fs::remove_file(place);
-        let count = self.with(|state| {
+        let count = self.with_state(|state| {
             state.bytes = state.bytes.saturating_sub(bytes);
             state.counts.damaged += 1;
             state.counts.damaged
@@ -175,20 +178,20 @@ impl ImageStore {
         }
     }
 
-    /// Adds the entry of a key, if there is room.
+    /// Writes the entry of a key, if the store has room.
     pub(crate) fn put(&self, key: &Key, entry: &Entry) {
-        if self.with(|state| state.health) != Health::Whole {
+        if self.with_state(|state| state.health) != Health::Usable {
             return;
         }
-        let file = entry.file(key);
+        let file = entry.encode(key);
         let bytes = file.len() as u64;
-        if !self.has_room(bytes) {
-            let count = self.with(|state| {
+        if !self.make_room(bytes) {
+            let count = self.with_state(|state| {
                 state.counts.left_out += 1;
                 state.counts.left_out
             });
             if count == 1 {
-                let (folder, most) = (self.named.display(), self.most as f64 / 1e9);
+                let (folder, most) = (self.argument.display(), self.capacity as f64 / 1e9);
                 tracing::warn!(
                     "--images-cache: {folder} is full, and no image in it is unused for 14 days; further ones are not stored; a larger \
                      --images-cache size than {most} makes room"
@@ -197,21 +200,21 @@ impl ImageStore {
             return;
         }
         match self.folder.write(key.digest(), &file) {
-            Ok(()) => self.with(|state| {
+            Ok(()) => self.with_state(|state| {
                 state.bytes += bytes;
                 if entry.facts.shown.content == Content::Image {
                     state.counts.written += 1;
                     state.counts.written_bytes += bytes;
                 }
             }),
-            Err(e) => self.fails(Health::ReadOnly, "write to", &e),
+            Err(e) => self.degrade(Health::ReadOnly, "write to", &e),
         }
     }
 
-    /// Whether there is room for a file. After some bytes the store is swept again.
-    fn has_room(&self, bytes: u64) -> bool {
-        let period = SWEEP_AFTER.min(self.most / SWEEP_SHARE);
-        let is_due = self.with(|state| {
+    /// Makes room for a file of this size, sweeping the store at intervals; returns false if it is full.
+    fn make_room(&self, bytes: u64) -> bool {
+        let period = SWEEP_AFTER.min(self.capacity / SWEEP_SHARE);
+        let is_due = self.with_state(|state| {
             state.offered += bytes;
             let is_due = state.offered >= period;
             if is_due {
@@ -220,41 +223,43 @@ impl ImageStore {
             is_due
         });
         if is_due {
-            // Room for the next period, too.
-            let most = self.most.saturating_sub(period.max(bytes));
-            match sweep(&self.folder, most, SystemTime::now()) {
-                Ok(swept) => self.with(|state| {
+            // Leave room for the files until the next sweep.
+            let max_bytes = self.capacity.saturating_sub(period.max(bytes));
+            match sweep(&self.folder, max_bytes, SystemTime::now()) {
+                Ok(swept) => self.with_state(|state| {
                     state.bytes = swept.bytes;
                     state.counts.evicted += swept.evicted;
                 }),
-                Err(e) => self.fails(Health::ReadOnly, "sweep", &e),
+                Err(e) => self.degrade(Health::ReadOnly, "sweep", &e),
             }
         }
-        self.with(|state| state.health == Health::Whole && state.bytes + bytes <= self.most)
+        self.with_state(|state| {
+            state.health == Health::Usable && state.bytes + bytes <= self.capacity
+        })
     }
 
-    /// Warns once that the store cannot be used, and goes on without.
-    fn fails(&self, health: Health, action: &str, problem: &io::Error) {
-        let was = self.with(|state| {
+    /// Lowers the health of the store after a failed `action`, with one warning for each level.
+    fn degrade(&self, health: Health, action: &str, problem: &io::Error) {
+        let previous = self.with_state(|state| {
             let worse = state.health.max(health);
             std::mem::replace(&mut state.health, worse)
         });
-        if was < health {
-            let folder = self.named.display();
+        if previous < health {
+            let folder = self.argument.display();
             let goes_on = match health {
-                Health::Gone => "all images are made here",
-                Health::ReadOnly | Health::Whole => "no more images are stored there",
+                Health::Unusable => "all images are made here",
+                Health::ReadOnly | Health::Usable => "no more images are stored there",
             };
             tracing::warn!("--images-cache: cannot {action} {folder}: {problem}; {goes_on}");
         }
     }
 
-    fn with<T>(&self, action: impl FnOnce(&mut State) -> T) -> T {
+    fn with_state<T>(&self, action: impl FnOnce(&mut StoreState) -> T) -> T {
         action(&mut self.state.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }
 
-/// The content of a file, whose use is noted. A file that is too large, or does not end as an entry does, is damaged and not read.
+/// Reads a file, and updates its time as a sign of use. A file that is too large, or has no valid footer, counts as damaged.
 fn read(path: &Path) -> io::Result<Result<Vec<u8>, Damaged>> {
     let mut file = reading::open(path)?;
     let data = file.metadata()?;
@@ -262,7 +267,7 @@ fn read(path: &Path) -> io::Result<Result<Vec<u8>, Damaged>> {
     let before = data.len().saturating_sub(FOOTER as u64);
     file.seek(SeekFrom::Start(before))?;
     (&mut file).take(FOOTER as u64).read_to_end(&mut footer)?;
-    if data.len() > MOST_BYTES || !fits(&footer, data.len()) {
+    if data.len() > MAX_BYTES || !is_footer_valid(&footer, data.len()) {
         return Ok(Err(Damaged));
     }
     file.rewind()?;
@@ -270,8 +275,8 @@ fn read(path: &Path) -> io::Result<Result<Vec<u8>, Damaged>> {
     (&mut file).take(data.len()).read_to_end(&mut content)?;
     let now = SystemTime::now();
     let used = data.modified().unwrap_or(now);
-    if now.duration_since(used).unwrap_or_default() > NOTED {
-        // A folder that can only be read keeps its times.
+    if now.duration_since(used).unwrap_or_default() > TOUCH_AFTER {
+        // Fails in a read-only folder, where times cannot be updated.
         let _ = file.set_modified(now);
     }
     Ok(Ok(content))

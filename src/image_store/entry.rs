@@ -1,6 +1,6 @@
-//! The file of one image in the store: [`Entry`].
+//! File format of one entry of the store: [`Entry`].
 //!
-//! A file is the image as it is sent, then facts about it as JSON, then a footer of [`FOOTER`] bytes:
+//! A file consists of the encoded image as it is sent to models, facts about it as JSON, and a footer of [`FOOTER`] bytes:
 //!
 //! | bytes | |
 //! |---|---|
@@ -9,7 +9,7 @@
 //! | 4, 4, 4 | length of the facts, width and height in pixels |
 //! | 8 | `DQIMAGE1` |
 //!
-//! Numbers are little-endian. The key is in the digest, so that an entry in the place of another is noticed.
+//! Numbers are little-endian. The digest covers the key, so that exchanged files are detected.
 
 use std::fmt;
 
@@ -18,52 +18,52 @@ use serde_json::Value;
 
 use super::key::Key;
 
-/// Last bytes of each file: kind and version of the form.
+/// Last bytes of each file: type and version of the format.
 const MAGIC: &[u8; 8] = b"DQIMAGE1";
 /// Length of the footer in bytes.
 pub(super) const FOOTER: usize = 32 + 8 + 3 * 4 + 8;
 
-/// An image as it is in the store.
+/// An entry of the store: an image with facts, or only facts.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Entry {
-    /// The file of the image, as it is sent, or of its small copy; empty if there are facts alone.
+    /// Encoded image or thumbnail; empty for an entry with facts only.
     pub(crate) image: Vec<u8>,
     /// Width and height in pixels; 0 without an image.
     pub(crate) size: [u32; 2],
     pub(crate) facts: EntryFacts,
 }
 
-/// Facts stored beside an image, or alone.
+/// Facts stored with an image, or without one.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct EntryFacts {
-    /// The subject of the entry, for lists of the store.
+    /// Description of the entry, for listings of the store.
     pub(crate) shown: Shown,
-    /// Time that it took to make, in milliseconds.
+    /// Time that the entry took to compute, in milliseconds.
     pub(crate) milliseconds: u64,
-    /// Findings about the image when it was made, in a form of the store's user.
+    /// Results recorded when the image was computed, in a format of the caller.
     #[serde(default)]
     pub(crate) notes: Value,
-    /// The input of the key's digest.
+    /// Input of the key's digest.
     #[serde(default)]
     recipe: Value,
 }
 
-/// The content of an entry.
+/// Type of an entry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Content {
-    /// An image, with what was found out about it.
+    /// An image, with its measures.
     #[default]
     Image,
-    /// Measures of an image that is not kept.
+    /// Measures of an image that is not stored.
     Measures,
-    /// The findings of an enhancer's probe.
+    /// Findings of an enhancer's probe.
     Probe,
-    /// A small copy of an image, for the report of a run.
+    /// Thumbnail of an image, for the report of a run.
     Thumbnail,
 }
 
-/// The subject of an entry, in words.
+/// Description of an entry in listings.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
 pub(crate) struct Shown {
     #[serde(default)]
@@ -71,9 +71,9 @@ pub(crate) struct Shown {
     /// Name of the enhancer; `None` without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) enhancer: Option<String>,
-    /// The degradation of the frame, as `L3-noise`; empty for a probe.
+    /// Degradation of the frame, such as `L3-noise`; empty for a probe.
     pub(crate) light: String,
-    /// Format, as `png`; empty for a probe.
+    /// Image format, such as `png`; empty for a probe.
     pub(crate) format: String,
 }
 
@@ -97,7 +97,7 @@ impl fmt::Display for Shown {
 }
 
 impl EntryFacts {
-    /// Facts of an image that took so many milliseconds to make.
+    /// Facts about an entry that took this time to compute.
     pub(crate) fn new(shown: Shown, milliseconds: u64, notes: Value) -> Self {
         Self {
             shown,
@@ -108,7 +108,7 @@ impl EntryFacts {
     }
 }
 
-/// Why a file is no entry.
+/// Error for a file that is not a valid entry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Damaged;
 
@@ -122,8 +122,8 @@ impl Entry {
         }
     }
 
-    /// The bytes of the file for a key.
-    pub(super) fn file(&self, key: &Key) -> Vec<u8> {
+    /// Encodes the entry as the file for a key.
+    pub(super) fn encode(&self, key: &Key) -> Vec<u8> {
         let facts = EntryFacts {
             recipe: key.recipe().clone(),
             ..self.facts.clone()
@@ -141,11 +141,11 @@ impl Entry {
         .concat()
     }
 
-    /// The entry in the bytes of a file.
+    /// Decodes the file of a key.
     ///
     /// # Errors
-    /// If the file is cut or changed, has another form, or is that of another key.
-    pub(super) fn read(key: &Key, mut file: Vec<u8>) -> Result<Self, Damaged> {
+    /// If the file is truncated or changed, has another format, or belongs to another key.
+    pub(super) fn decode(key: &Key, mut file: Vec<u8>) -> Result<Self, Damaged> {
         let footer = Footer::read(&file)?;
         let (image, rest) = file.split_at(footer.image);
         let facts = rest.get(..footer.facts).ok_or(Damaged)?;
@@ -162,8 +162,8 @@ impl Entry {
     }
 }
 
-/// Reads the end of a file without checking its digest: the facts, and the length of the image in bytes. `tail` is the end of the
-/// file, `length` the length of the whole.
+/// Decodes the facts and the image's length in bytes from the end of a file, `tail`, without checking the digest. `length` is the length of
+/// the whole file.
 pub(super) fn facts_at_end(tail: &[u8], length: u64) -> Option<(EntryFacts, u64)> {
     let start = tail.len().checked_sub(FOOTER)?;
     let (body, footer) = tail.split_at(start);
@@ -172,12 +172,12 @@ pub(super) fn facts_at_end(tail: &[u8], length: u64) -> Option<(EntryFacts, u64)
     Some((serde_json::from_slice(facts).ok()?, image))
 }
 
-/// Whether a file of such a length can end in this footer.
-pub(super) fn fits(footer: &[u8], length: u64) -> bool {
+/// True if a file of this length can end in this footer.
+pub(super) fn is_footer_valid(footer: &[u8], length: u64) -> bool {
     lengths(footer, length).is_some()
 }
 
-/// The lengths of the image and of the facts, as a footer states them; `None` if the file has another length.
+/// Lengths of image and facts that a footer states; `None` if they contradict the file's length.
 fn lengths(footer: &[u8], length: u64) -> Option<(u64, u32)> {
     let image = u64::from_le_bytes(footer.get(32..40)?.try_into().ok()?);
     let facts = u32::from_le_bytes(footer.get(40..44)?.try_into().ok()?);
@@ -185,12 +185,16 @@ fn lengths(footer: &[u8], length: u64) -> Option<(u64, u32)> {
     (footer.get(52..)? == MAGIC && whole == length).then_some((image, facts))
 }
 
-/// The footer of a file whose length fits.
+/// Decoded footer of a file.
 struct Footer {
     digest: blake3::Hash,
+    /// The encoded lengths and sides, which the digest covers.
     numbers: [u8; 20],
+    /// Length of the image in bytes.
     image: usize,
+    /// Length of the facts in bytes.
     facts: usize,
+    /// Width and height in pixels.
     size: [u32; 2],
 }
 
@@ -201,17 +205,11 @@ impl Footer {
         let (numbers, magic) = rest.split_at(20);
         let digest: [u8; 32] = digest.try_into().map_err(|_| Damaged)?;
         let numbers: [u8; 20] = numbers.try_into().map_err(|_| Damaged)?;
-        let word = |at: usize| {
-            let bytes = [
-                numbers[at],
-                numbers[at + 1],
-                numbers[at + 2],
-                numbers[at + 3],
-            ];
-            u32::from_le_bytes(bytes)
-        };
-        let image = u64::from(word(0)) | u64::from(word(4)) << 32;
-        let facts = u64::from(word(8));
+        let (words, _) = numbers.as_chunks::<4>();
+        let words: [u32; 5] = std::array::from_fn(|index| u32::from_le_bytes(words[index]));
+        let [image_low, image_high, facts, width, height] = words;
+        let image = u64::from(image_low) | u64::from(image_high) << 32;
+        let facts = u64::from(facts);
         if magic != MAGIC || image.checked_add(facts) != Some(start as u64) {
             return Err(Damaged);
         }
@@ -220,7 +218,7 @@ impl Footer {
             numbers,
             image: image as usize,
             facts: facts as usize,
-            size: [word(12), word(16)],
+            size: [width, height],
         })
     }
 }
@@ -258,29 +256,32 @@ mod tests {
     }
 
     #[test]
-    fn an_entry_reads_back_and_no_changed_byte_does() {
+    fn decoding_inverts_encoding_and_detects_every_changed_byte() {
         let (key, other) = (
             Key::from_recipe(&["a"]).unwrap(),
             Key::from_recipe(&["b"]).unwrap(),
         );
-        let file = entry().file(&key);
-        let read = Entry::read(&key, file.clone()).unwrap();
+        let file = entry().encode(&key);
+        let read = Entry::decode(&key, file.clone()).unwrap();
         assert_eq!((&read.image, read.size), (&entry().image, [16, 9]));
         assert_eq!(read.facts.notes, entry().facts.notes);
-        assert_eq!(Entry::read(&other, file.clone()), Err(Damaged));
+        assert_eq!(Entry::decode(&other, file.clone()), Err(Damaged));
         for place in 0..file.len() {
             let mut changed = file.clone();
             changed[place] ^= 1;
-            assert_eq!(Entry::read(&key, changed), Err(Damaged), "{place}");
-            assert_eq!(Entry::read(&key, file[..place].to_vec()), Err(Damaged));
+            assert_eq!(Entry::decode(&key, changed), Err(Damaged), "{place}");
+            assert_eq!(Entry::decode(&key, file[..place].to_vec()), Err(Damaged));
         }
-        assert_eq!(Entry::read(&key, [&file[..], b"x"].concat()), Err(Damaged));
+        assert_eq!(
+            Entry::decode(&key, [&file[..], b"x"].concat()),
+            Err(Damaged)
+        );
     }
 
     #[test]
-    fn the_end_of_a_file_tells_what_it_shows() {
+    fn facts_are_decoded_from_the_end_of_a_file() {
         let key = Key::from_recipe(&["a"]).unwrap();
-        let file = entry().file(&key);
+        let file = entry().encode(&key);
         let (facts, image) = facts_at_end(&file[200..], file.len() as u64).unwrap();
         assert_eq!((facts.milliseconds, image), (120, 256));
         assert_eq!(facts.recipe, serde_json::json!(["a"]));

@@ -1,4 +1,4 @@
-//! The places of files in a store's folder: [`StoreFolder`].
+//! Files in the folder of a store: [`StoreFolder`].
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write as _};
@@ -10,11 +10,11 @@ use crate::files::folder_access::FolderAccess;
 use crate::files::reading;
 use crate::types::Digest;
 
-/// Version of the layout, a folder of its own.
+/// Version of the layout, as the name of its folder.
 const VERSION: &str = "v1";
-/// Ending of the name of an entry's file.
+/// File extension of entries.
 const ENTRY: &str = ".img";
-/// Beginning of the name of a file that is not complete.
+/// Prefix of the names of incomplete files.
 const UNFINISHED: &str = ".tmp-";
 
 /// The folder of a store.
@@ -22,12 +22,12 @@ const UNFINISHED: &str = ".tmp-";
 pub(super) struct StoreFolder {
     /// Folder of this version's files.
     root: PathBuf,
-    /// Who may enter it. It is made again if somebody deletes it.
+    /// Permissions with which the folder is created, at first and after it was deleted.
     access: FolderAccess,
-    /// Beginning of the names of this process's unfinished files: no other process, on this machine or another, has it.
-    unfinished: String,
-    /// Number of unfinished files so far.
-    count: AtomicUsize,
+    /// Prefix of the names of this process's incomplete files, unique among the processes of all machines.
+    unfinished_prefix: String,
+    /// Number of incomplete files created so far.
+    unfinished_count: AtomicUsize,
 }
 
 /// A file in a store.
@@ -37,7 +37,7 @@ pub(super) struct StoredFile {
     pub(super) kind: FileKind,
     /// Length in bytes.
     pub(super) bytes: u64,
-    /// When it was last used, to a day.
+    /// Time of the last use, accurate to a day.
     pub(super) used: SystemTime,
 }
 
@@ -50,60 +50,64 @@ pub(super) enum FileKind {
 impl StoreFolder {
     pub(super) fn new(folder: &Path, access: FolderAccess) -> Self {
         let host = fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
-        let plain = |letter: &char| letter.is_ascii_alphanumeric() || *letter == '-';
-        let host: String = host.chars().filter(plain).take(64).collect();
+        let host: String = host
+            .chars()
+            .filter(|letter| letter.is_ascii_alphanumeric() || *letter == '-')
+            .take(64)
+            .collect();
         Self {
             root: folder.join(VERSION),
             access,
-            unfinished: format!("{UNFINISHED}{host}-{}-", std::process::id()),
-            count: AtomicUsize::new(0),
+            unfinished_prefix: format!("{UNFINISHED}{host}-{}-", std::process::id()),
+            unfinished_count: AtomicUsize::new(0),
         }
     }
 
-    /// The folder of this version's files.
+    /// Folder of this version's files.
     pub(super) fn root(&self) -> &Path {
         &self.root
     }
 
-    /// Makes the folder.
-    pub(super) fn make(&self) -> io::Result<()> {
+    /// Creates the folder if it is missing.
+    pub(super) fn create(&self) -> io::Result<()> {
         refuse_link(&self.root)?;
         self.access.create_io(&self.root)
     }
 
-    /// The file of a key.
-    pub(super) fn place(&self, key: &Digest) -> PathBuf {
+    /// Path of the file of a key.
+    pub(super) fn path(&self, key: &Digest) -> PathBuf {
         let name = key.to_string();
         let (folder, rest) = name.split_at(2);
         self.root.join(folder).join(format!("{rest}{ENTRY}"))
     }
 
-    /// Writes the file of a key, completely or not at all. It is not forced to the disk, as it can be made again.
+    /// Writes the file of a key atomically, without flushing it to the disk, because it can be computed again.
     pub(super) fn write(&self, key: &Digest, content: &[u8]) -> io::Result<()> {
-        let place = self.place(key);
-        let folder = place.parent().unwrap_or(&self.root);
-        self.make()?;
+        let path = self.path(key);
+        let folder = path.parent().unwrap_or(&self.root);
+        self.create()?;
         refuse_link(folder)?;
         self.access.create_io(folder)?;
-        let number = self.count.fetch_add(1, Ordering::Relaxed);
-        let unfinished = folder.join(format!("{}{number}", self.unfinished));
-        let written = File::create_new(&unfinished)
+        let number = self.unfinished_count.fetch_add(1, Ordering::Relaxed);
+        let unfinished = folder.join(format!("{}{number}", self.unfinished_prefix));
+        let result = File::create_new(&unfinished)
             .and_then(|mut file| file.write_all(content))
-            .and_then(|()| fs::rename(&unfinished, &place));
-        if written.is_err() {
-            // What remains is swept when it is old.
+            .and_then(|()| fs::rename(&unfinished, &path));
+        if result.is_err() {
+            // If removal fails, a later sweep removes the file.
             let _ = fs::remove_file(&unfinished);
         }
-        written
+        result
     }
 
-    /// All files of the store; what is not of its form is left out. Files that vanish meanwhile are, too.
+    /// All files of the store, sorted by path. Foreign files are left out, as are files that are deleted while the folder is read. A
+    /// missing folder has no files.
     ///
     /// # Errors
-    /// If the folder cannot be read. One that does not exist has no files.
+    /// If the folder cannot be read.
     pub(super) fn files(&self) -> io::Result<Vec<StoredFile>> {
         let mut files = Vec::new();
-        let Some(folders) = found(fs::read_dir(&self.root))? else {
+        let Some(folders) = if_exists(fs::read_dir(&self.root))? else {
             return Ok(files);
         };
         for folder in folders {
@@ -112,7 +116,7 @@ impl StoreFolder {
             if !is_folder || !is_hexadecimal(&folder.file_name().to_string_lossy(), 2) {
                 continue;
             }
-            let Some(entries) = found(fs::read_dir(folder.path()))? else {
+            let Some(entries) = if_exists(fs::read_dir(folder.path()))? else {
                 continue;
             };
             for entry in entries {
@@ -124,9 +128,9 @@ impl StoreFolder {
         Ok(files)
     }
 
-    /// The file that is locked while files are removed.
+    /// Opens the file that is locked while files are removed.
     pub(super) fn lock_file(&self) -> io::Result<File> {
-        self.make()?;
+        self.create()?;
         let mut options = OpenOptions::new();
         options.write(true).create(true).truncate(false);
         let path = self.root.join(".lock");
@@ -140,7 +144,7 @@ impl StoreFolder {
     }
 }
 
-/// Refuses a link in a store, which may come from a stranger: what is written there would go elsewhere.
+/// Refuses a symbolic link, with which another user could redirect writes to other folders.
 fn refuse_link(path: &Path) -> io::Result<()> {
     if path.is_symlink() {
         let problem = format!("{} is a link; delete it", path.display());
@@ -149,7 +153,7 @@ fn refuse_link(path: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// A file of a store; `None` for what is not one.
+/// The file of a store for a directory entry; `None` for foreign files.
 fn stored_file(entry: &fs::DirEntry) -> Option<StoredFile> {
     let name = entry.file_name().to_string_lossy().into_owned();
     let stem = name.strip_suffix(ENTRY);
@@ -170,12 +174,14 @@ fn stored_file(entry: &fs::DirEntry) -> Option<StoredFile> {
 }
 
 fn is_hexadecimal(text: &str, length: usize) -> bool {
-    let digit = |byte: u8| byte.is_ascii_digit() || (b'a'..=b'f').contains(&byte);
-    text.len() == length && text.bytes().all(digit)
+    text.len() == length
+        && text
+            .bytes()
+            .all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'))
 }
 
-/// A result, or `None` if the file or folder does not exist.
-pub(super) fn found<T>(result: io::Result<T>) -> io::Result<Option<T>> {
+/// Turns the error about a missing file or folder into `None`.
+pub(super) fn if_exists<T>(result: io::Result<T>) -> io::Result<Option<T>> {
     match result {
         Ok(value) => Ok(Some(value)),
         Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(None),

@@ -1,8 +1,8 @@
-//! The images that a run keeps, before they are made: [`ImageSet`].
+//! Estimate of the bytes that a run would store: [`ImageSet`].
 
 use super::kinds::StoredKinds;
 
-/// The number of bytes of all images of a run that a store would keep, and the room that it has.
+/// Estimated size of a run's images that a store would keep, and the store's capacity, in bytes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ImageSet {
     kinds: StoredKinds,
@@ -11,7 +11,7 @@ pub(crate) struct ImageSet {
 }
 
 impl ImageSet {
-    /// The set of no image yet, for a store with this room in bytes.
+    /// An empty set, for a store with this capacity in bytes.
     pub(super) fn new(kinds: StoredKinds, room: f64) -> Self {
         Self {
             kinds,
@@ -20,15 +20,15 @@ impl ImageSet {
         }
     }
 
-    /// Adds images of this many bytes in all, if the store keeps such images.
+    /// Adds images of this total size in bytes, if the store keeps images of this kind.
     pub(crate) fn add(&mut self, is_enhanced: bool, bytes: f64) {
         if is_enhanced || self.kinds == StoredKinds::All {
             self.bytes += bytes;
         }
     }
 
-    /// Which images these are, in words.
-    pub(crate) fn words(&self) -> &'static str {
+    /// Description of the images that the store keeps.
+    pub(crate) fn description(&self) -> &'static str {
         match self.kinds {
             StoredKinds::Enhanced => "enhanced images",
             StoredKinds::All => "images",

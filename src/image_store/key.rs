@@ -1,4 +1,4 @@
-//! The key of an image in the store: [`Key`].
+//! Key of an entry in the store: [`Key`].
 
 use serde::Serialize;
 use serde_json::Value;
@@ -6,11 +6,11 @@ use serde_json::Value;
 use crate::error::Result;
 use crate::types::Digest;
 
-/// Name and version of what keys are digests of. The version is raised when the same recipe gives another image, or when an entry has
-/// other facts; entries of other versions are not found any more, and leave by their age.
+/// Domain and version of the digests. The version is raised when the same recipe gives another image, or when entries get other facts.
+/// Entries of other versions are not found any more, and are evicted when they are old.
 const DOMAIN: &str = "darkqa.image-store/1";
 
-/// Digest of all that decides the file of an image, with the canonical JSON that it is the digest of.
+/// Digest of a recipe (everything that determines the file of an image), with the recipe as canonical JSON.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Key {
     digest: Digest,
@@ -18,7 +18,7 @@ pub(crate) struct Key {
 }
 
 impl Key {
-    /// The key of a recipe: all that decides the bytes of an image, and nothing else.
+    /// The key of a recipe, which must contain everything that determines the bytes of an image, and nothing else.
     ///
     /// # Errors
     /// If a number of the recipe is infinite or NaN.

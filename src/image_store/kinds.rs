@@ -1,4 +1,4 @@
-//! Which images a store keeps: [`StoredKinds`].
+//! Kinds of images that a store keeps: [`StoredKinds`].
 
 use clap::ValueEnum;
 

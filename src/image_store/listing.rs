@@ -1,4 +1,4 @@
-//! Lists the content of a store in a table: [`listing`]; and empties it: [`clear`].
+//! Table of the content of a store ([`listing`]), and removal of its images ([`clear`]).
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -13,12 +13,12 @@ use crate::error::{Error, Result};
 use crate::files::folder_access::FolderAccess;
 use crate::files::reading;
 
-/// Bytes at the end of a file that are read for its facts; chosen: facts have less than 4 kB.
+/// Number of bytes read from the end of a file for its facts; chosen (facts take less than 4 kB).
 const TAIL: u64 = 16 << 10;
-/// Ages by which images are counted, in days.
+/// Limits of the age classes in the table, in days.
 const AGES: [u64; 3] = [1, 7, 14];
 
-/// Number of images, their bytes and the time that they took to make.
+/// Number of images, their size, and the time that they took to compute.
 #[derive(Debug, Clone, Copy, Default)]
 struct Sum {
     images: usize,
@@ -40,10 +40,10 @@ impl Sum {
     }
 }
 
-/// A table of the images in the store of a folder: by what they show, and by the time since they were used.
+/// Table of the images of a store, by description and by time since the last use.
 ///
 /// # Errors
-/// If the folder is not that of a store, or cannot be read.
+/// If the folder is not a store, or cannot be read.
 pub(crate) fn listing(folder: &Path) -> Result<String> {
     let (files, now) = (files(folder)?, SystemTime::now());
     let (mut all, mut by_shown) = (Sum::default(), BTreeMap::<Option<Shown>, Sum>::new());
@@ -63,9 +63,11 @@ pub(crate) fn listing(folder: &Path) -> Result<String> {
         let sum = by_shown.entry(shown).or_default();
         sum.add(file.bytes, milliseconds);
         let age = now.duration_since(file.used).unwrap_or_default();
-        let is_younger = |days: &u64| age < Duration::from_hours(24 * days);
-        let place = AGES.iter().position(is_younger).unwrap_or(AGES.len());
-        by_age[place].add(file.bytes, milliseconds);
+        let age_class = AGES
+            .iter()
+            .position(|days| age < Duration::from_hours(24 * days))
+            .unwrap_or(AGES.len());
+        by_age[age_class].add(file.bytes, milliseconds);
     }
     let mut text = String::from("    files          MB  s to make it\n");
     for (shown, sum) in &by_shown {
@@ -74,10 +76,12 @@ pub(crate) fn listing(folder: &Path) -> Result<String> {
             ToString::to_string,
         ));
     }
-    for (place, sum) in by_age.iter().enumerate().filter(|(_, sum)| sum.images > 0) {
-        let days = |days: u64| if days == 1 { "day" } else { "days" };
-        text += &sum.line(&match AGES.get(place) {
-            Some(age) => format!("used less than {age} {} ago", days(*age)),
+    for (age_class, sum) in by_age.iter().enumerate().filter(|(_, sum)| sum.images > 0) {
+        text += &sum.line(&match AGES.get(age_class) {
+            Some(age) => {
+                let days = if *age == 1 { "day" } else { "days" };
+                format!("used less than {age} {days} ago")
+            }
             None => format!("not used for {} days", AGES[AGES.len() - 1]),
         });
     }
@@ -91,10 +95,10 @@ pub(crate) fn listing(folder: &Path) -> Result<String> {
     Ok(text)
 }
 
-/// Removes all images of the store of a folder; other files stay. Returns what was removed, in words.
+/// Removes all images of a store, and returns a message with their number. Foreign files stay.
 ///
 /// # Errors
-/// If the folder is not that of a store, or a file cannot be removed.
+/// If the folder is not a store, or a file cannot be removed.
 pub(crate) fn clear(folder: &Path) -> Result<String> {
     let mut sum = Sum::default();
     for file in files(folder)? {
@@ -112,7 +116,7 @@ pub(crate) fn clear(folder: &Path) -> Result<String> {
     ))
 }
 
-/// The files of the store of a folder.
+/// Files of the store in a folder.
 fn files(folder: &Path) -> Result<Vec<StoredFile>> {
     let store = StoreFolder::new(folder, FolderAccess::Private);
     if !store.root().is_dir() {
@@ -124,7 +128,7 @@ fn files(folder: &Path) -> Result<Vec<StoredFile>> {
         .map_err(|e| Error::file(store.root(), "read", e))
 }
 
-/// The facts of an entry; `None` if it is damaged. Its image is not read.
+/// Facts of an entry, read without its image; `None` if the entry is damaged.
 fn facts(file: &StoredFile) -> Option<super::EntryFacts> {
     let mut content = reading::open(&file.path).ok()?;
     let start = file.bytes.saturating_sub(TAIL);

@@ -1,4 +1,4 @@
-//! The flags of the image store: [`StoreArgs`].
+//! Flags of the image store: [`StoreArgs`].
 
 use std::path::PathBuf;
 
@@ -31,20 +31,20 @@ pub(crate) struct StoreArgs {
 }
 
 impl StoreArgs {
-    /// The images that the store would keep, of which none is counted yet; `None` without a folder.
+    /// An empty estimate of the images that the store would keep; `None` without a store.
     pub(crate) fn image_set(&self) -> Option<ImageSet> {
         let set = ImageSet::new(self.images_cache_what, self.images_cache_size * 1e9);
         self.images_cache.is_some().then_some(set)
     }
 
-    /// The store that the flags name; `None` without a folder.
+    /// Opens the store; `None` if the flags name no folder.
     ///
     /// # Errors
-    /// If its folder cannot be made or written to.
+    /// If the folder cannot be created or read.
     pub(crate) fn open(&self, access: FolderAccess) -> Result<Option<ImageStore>> {
         let bytes = (self.images_cache_size * 1e9) as u64;
-        let folder = self.images_cache.as_deref();
-        folder
+        self.images_cache
+            .as_deref()
             .map(|folder| ImageStore::open(folder, access, self.images_cache_what, bytes))
             .transpose()
     }

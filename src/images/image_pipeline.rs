@@ -322,7 +322,7 @@ impl<'a> ImagePipeline<'a> {
                 enhancer,
                 notes,
             } => {
-                self.note_stored_image(&notes, &enhancer, [frame, condition])?;
+                self.judge_stored_image(&notes, &enhancer, [frame, condition])?;
                 Ok(image)
             }
             StagedImage::ToEnhance {
@@ -339,7 +339,7 @@ impl<'a> ImagePipeline<'a> {
     }
 
     /// Adds a stored image to the usage of its enhancer, as if it had been enhanced now.
-    fn note_stored_image(
+    fn judge_stored_image(
         &mut self,
         notes: &StoredNotes,
         name: &EnhancerName,
@@ -350,11 +350,11 @@ impl<'a> ImagePipeline<'a> {
             return Ok(());
         };
         if let Some(images) = self.steps.recipe.enhanced_images(name) {
-            return used.note_made_elsewhere(images.usage(), images.folder(), place, implausible);
+            return used.record_external(images.usage(), images.folder(), place, implausible);
         }
         match self.lazy_enhancer(name) {
-            Some(lazy) => used.note_in(lazy.usage(), lazy.path(), place, implausible),
-            None => self.enhancer(name)?.note_stored(used, place, implausible),
+            Some(lazy) => used.record(lazy.usage(), lazy.path(), place, implausible),
+            None => self.enhancer(name)?.judge_stored(used, place, implausible),
         }
     }
 
@@ -375,12 +375,12 @@ impl<'a> ImagePipeline<'a> {
         let place: [&dyn ToString; 2] = [frame, condition];
         if let Some(lazy) = self.lazy_enhancer(name) {
             return timings.time(TimedStep::Enhance, || {
-                lazy.enhance_noted(image, place, implausible)
+                lazy.enhance_and_judge(image, place, implausible)
             });
         }
         let enhancer = self.enhancer(name)?;
         timings.time(TimedStep::Enhance, || {
-            enhancer.enhance_noted(image, place, implausible)
+            enhancer.enhance_and_judge(image, place, implausible)
         })
     }
 

@@ -92,7 +92,7 @@ pub(crate) fn estimate<E: Experiment>(
         batch: money.prices.batch,
         image_store: images
             .set
-            .map(|set| StoreForecast::new(set.words(), set.bytes(), set.room())),
+            .map(|set| StoreForecast::new(set.description(), set.bytes(), set.room())),
         reply: E::REPLY,
         few_sources: is_few.then_some(few_sources),
         power: experiment.power().filter(|_| experiment.part().is_none()),

@@ -1,4 +1,4 @@
-//! A folder of images that were enhanced elsewhere, as a flag names it: [`EnhancedFolder`].
+//! Value of the flag for images that another program enhanced: [`EnhancedFolder`].
 
 use std::fmt;
 use std::path::PathBuf;
@@ -6,12 +6,12 @@ use std::str::FromStr;
 
 use darkqa_ground::types::EnhancerName;
 
-/// A folder of images that were enhanced elsewhere, with the name of their enhancer.
+/// A folder of images that another program enhanced (`NAME=DIR`).
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct EnhancedFolder {
     /// The name of the enhancer in tables and records.
     pub name: EnhancerName,
-    /// The folder.
+    /// Folder of the images.
     pub folder: PathBuf,
 }
 

@@ -1,6 +1,6 @@
 //! A user's ONNX model on ONNX Runtime's CPU provider: [`Enhancer`].
 
-mod known;
+mod accessors;
 pub(super) mod twin;
 
 use std::collections::BTreeSet;
@@ -12,33 +12,34 @@ use darkqa_ground::types::{Digest, EnhancerName, Rgb, SizeLog};
 
 use super::conventions::Description;
 use super::conventions::sidecar::{self, ADD};
-use super::failure::{RunFailure, by, unusable};
+use super::failure::{RunFailure, describe_invalid_values, format_size};
 use super::files::{ModelFile, RandomOperators, traced_sizes};
 use super::graphs::{Graph, GraphSource, LoadLimits, RunResult, Stopper};
 use super::inputs::DarkImage;
 use super::libraries::Runtime;
-use super::limits::{MOST_ENDED, MemoryCheck, MemoryLimit, TimeLimit, no_memory};
-use super::outputs::OutOfRange;
+use super::limits::{MAX_CONSECUTIVE_OVERRUNS, MemoryCheck, MemoryLimit, TimeLimit, out_of_memory};
+use super::outputs::InvalidValues;
 use super::planes::Planes;
 use super::probes::Usage;
 use super::sizing::reach::{self, Context};
 use super::sizing::{
-    MULTIPLES, NoPlan, SeamRule, SizePlan, SizeRule, SizeSearch, TakenSizes, TileWindow,
-    TiledImage, Tiling, count_image, count_planned, global, not_found, seams_differ,
+    AcceptedSizes, MULTIPLES, PlanError, SeamRule, SizePlan, SizeRule, SizeSearch, TileWindow,
+    TiledImage, Tiling, count_image, count_planned, not_local, seams_differ, sizes_not_found,
 };
 
-/// How an image of another size reaches a model of a fixed size.
+/// Adaptation of an image to a model that accepts only another, fixed size.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Fitting {
-    /// It is filled or cut into tiles, if the model is local; otherwise it is refused.
+    /// Pad the image or cut it into tiles. Refused if a pixel of the output depends on distant pixels.
     #[default]
     Tiles,
-    /// It is resized to the fixed size, and the result back (`--llie-options resize`): its shape is not kept, and it is blurred.
+    /// Resize the image to the fixed size, and the result back (`--llie-options resize`). This changes the aspect ratio in between and
+    /// blurs the image.
     Resize,
 }
 
-/// The remark on a graph with random operators.
-fn random_words(random: &RandomOperators) -> Option<String> {
+/// Caveat about a graph that draws random numbers; `None` without random operators.
+fn random_remark(random: &RandomOperators) -> Option<String> {
     let names: Vec<&str> = random.names.iter().map(String::as_str).collect();
     (!names.is_empty()).then(|| {
         format!(
@@ -48,16 +49,16 @@ fn random_words(random: &RandomOperators) -> Option<String> {
     })
 }
 
-/// Side, in pixels, of an image for which any model should get its memory; chosen.
-const SMALL: usize = 64;
+/// Side, in pixels, of an image for which memory should suffice with any model; chosen.
+const SMALL_SIDE: usize = 64;
 
-/// Result of one attempt at an image: the enhanced image, or what another size may change.
+/// Result of one attempt to enhance an image: the image, or a failure that another input size may avoid.
 type Attempt = std::result::Result<Rgb, RunFailure>;
 
 /// A loaded enhancement model.
 pub struct Enhancer {
-    /// The words that name it, as the user gave them.
-    named: PathBuf,
+    /// The argument that names the model, as the user wrote it.
+    argument: PathBuf,
     digest: Digest,
     path: PathBuf,
     name: EnhancerName,
@@ -66,33 +67,33 @@ pub struct Enhancer {
     fitting: Fitting,
     max_side: Option<NonZeroUsize>,
     search: SizeSearch,
-    /// Heights and widths of images at which the model failed as they are.
+    /// Heights and widths of images that the model refused unpadded.
     refused: BTreeSet<[usize; 2]>,
     context: Context,
     memory: MemoryCheck,
     log: SizeLog,
-    /// Images in a row that took too much time or memory.
-    ended: usize,
+    /// Number of images in a row that exceeded the limit of time or memory.
+    consecutive_overruns: usize,
     description: Description,
     usage: Usage,
-    /// Number of this enhancer among those that share the usage.
+    /// Index of this enhancer among the twins that share `usage`.
     twin: usize,
 }
 
 impl Enhancer {
-    /// Loads a model from the bytes that [`ModelFile::read`] read, so that the digest is that of the model that runs.
-    /// `threads` is the number of threads for one image, by default the number of cores.
+    /// Loads a model from the bytes in `file`, so that the digest belongs to the bytes that run. `threads` is the number of threads for
+    /// one image, by default the number of cores.
     ///
     /// # Errors
-    /// If the file is not an ONNX model, ONNX Runtime refuses it, or its inputs and outputs are not one RGB image each.
+    /// If ONNX Runtime refuses the model, or the image cannot be identified among its inputs or outputs.
     pub fn open(file: ModelFile, runtime: &Runtime, threads: Option<NonZeroUsize>) -> Result<Self> {
         Self::open_within(file, runtime, threads, LoadLimits::NONE)
     }
 
-    /// Loads a model as [`Self::open`] does, within limits that hold for each image, too.
+    /// Loads a model like [`Self::open`], with limits of time and memory for loading and for each image.
     ///
     /// # Errors
-    /// As [`Self::open`], or if loading takes more than the limits. ONNX Runtime cannot be used any more then.
+    /// As [`Self::open`], or if loading exceeds the limits. ONNX Runtime is then unusable for the rest of the process.
     pub fn open_within(
         mut file: ModelFile,
         runtime: &Runtime,
@@ -102,9 +103,9 @@ impl Enhancer {
         let flushed = file.weights.flush_subnormals(&mut file.bytes);
         let traced = traced_sizes(&file.bytes);
         let random = RandomOperators::find(&file.bytes).unwrap_or_default();
-        // ONNX Runtime finds external data only from the model's path.
+        // ONNX Runtime locates external data relative to the model's path, so such a model is loaded from its file.
         let source = if file.weights.external.is_empty() {
-            GraphSource::Memory(random.seeded(file.bytes))
+            GraphSource::Memory(random.with_seeds(file.bytes))
         } else {
             GraphSource::Path(file.path.clone())
         };
@@ -118,17 +119,17 @@ impl Enhancer {
         )?
         .map_err(|problem| {
             let path = file.path.clone();
-            let problem = sidecar::named(&problem, &path);
+            let problem = sidecar::insert_sidecar_name(&problem, &path);
             Error::Enhancer { path, problem }
         })?;
         let remarks = graph
             .unread_images()
             .into_iter()
-            .chain(random_words(&random))
-            .map(|words| sidecar::named(&words, &file.path))
+            .chain(random_remark(&random))
+            .map(|words| sidecar::insert_sidecar_name(&words, &file.path))
             .collect();
         let enhancer = Self {
-            named: file.named,
+            argument: file.argument,
             digest: file.digest,
             path: file.path,
             name: file.name,
@@ -141,11 +142,11 @@ impl Enhancer {
             context: Context::default(),
             memory: MemoryCheck::new(),
             log: SizeLog::default(),
-            ended: 0,
+            consecutive_overruns: 0,
             description: Description {
                 sidecar: file.sidecar,
                 preset: file.preset,
-                assumed: false,
+                has_assumed_ranges: false,
                 remarks,
                 flushed,
             },
@@ -162,27 +163,27 @@ impl Enhancer {
         Self { tiling, ..self }
     }
 
-    /// Sets how images reach a model of a fixed size; the default is [`Fitting::Tiles`].
+    /// Sets how images of other sizes reach a model with a fixed size; the default is [`Fitting::Tiles`].
     #[must_use]
     pub fn with_fitting(self, fitting: Fitting) -> Self {
         Self { fitting, ..self }
     }
 
-    /// Sets the longest time that one image may take; the default of this call is none, that of the program 600 s.
+    /// Sets the time limit for one image. Without this call there is none; the program's flag defaults to 600 s.
     #[must_use]
     pub fn with_time_limit(mut self, limit: TimeLimit) -> Self {
         self.graph.limit_time(limit);
         self
     }
 
-    /// Sets the memory that the process may take while the model runs; the default of this call is any.
+    /// Sets the limit of the process's memory while the model runs. Without this call there is none.
     #[must_use]
     pub fn with_memory_limit(mut self, limit: MemoryLimit) -> Self {
         self.graph.limit_memory(limit);
         self
     }
 
-    /// Sets the largest longer side, in pixels: larger images are reduced to it, enhanced and scaled back.
+    /// Sets the maximum longer side, in pixels: larger images are reduced to it, enhanced and scaled back.
     #[must_use]
     pub fn with_max_side(self, max_side: Option<NonZeroUsize>) -> Self {
         Self { max_side, ..self }
@@ -194,20 +195,20 @@ impl Enhancer {
         &self.name
     }
 
-    /// In which sizes the images were enhanced so far.
+    /// Counts of whole, padded, tiled and resized images so far.
     #[must_use]
     pub fn sizes(&self) -> &SizeLog {
         &self.log
     }
 
-    /// A table, as text, of how the model is fed and read, with the source of each value.
+    /// Table, as text, of the model's input and output convention, with the source of each value.
     #[must_use]
     pub fn describe(&self) -> String {
         self.description
             .text(&self.path, &self.graph, &self.graph.convention)
     }
 
-    /// A handle that ends a run from another thread.
+    /// A handle that stops the enhancer from another thread.
     #[must_use]
     pub fn stopper(&self) -> Stopper {
         self.graph.stopper()
@@ -215,53 +216,55 @@ impl Enhancer {
 
     /// Enhances an image; the result has the same size.
     ///
-    /// If the model has a fixed size, the image is filled or cut into tiles of that size, if the model is local. If it fails at
-    /// the image's size, the sizes that it takes are searched by trial, once.
+    /// For a model with a fixed size, the image is padded or cut into tiles of that size. If the model fails at the image's size, the
+    /// accepted sizes are searched by trial, once per model.
     ///
     /// # Errors
-    /// If the model fails on this image, gives another size than it was given, or values that are not numbers or not in the
-    /// expected range; if tiles differ where they overlap; if memory or time do not suffice.
+    /// If the model fails on this image, returns another size or values that are NaN or out of range, if tiles differ where they
+    /// overlap, or if a limit of memory or time is exceeded.
     pub fn enhance(&mut self, image: &Rgb) -> Result<Rgb> {
-        if self.ended >= MOST_ENDED {
-            return Err(self.fault(format!(
-                "is no longer run, because {MOST_ENDED} images in a row exceeded the limit of time or memory (--llie-options timeout, max-memory)"
+        if self.consecutive_overruns >= MAX_CONSECUTIVE_OVERRUNS {
+            return Err(self.error(format!(
+                "is no longer run, because {MAX_CONSECUTIVE_OVERRUNS} images in a row exceeded the limit of time or memory (--llie-options timeout, max-memory)"
             )));
         }
         self.graph.restart_clock();
         let size = [image.height(), image.width()];
         let attempt = match self.attempt(image, self.rule(size))? {
-            Err(failure) if failure.is_of_size() => self.in_another_size(image, failure)?,
+            Err(failure) if failure.may_depend_on_size() => {
+                self.attempt_at_found_size(image, failure)?
+            }
             attempt => attempt,
         };
         match attempt {
-            Err(RunFailure::TooLong(_)) => {
-                self.ended += 1;
+            Err(RunFailure::TimedOut(_)) => {
+                self.consecutive_overruns += 1;
                 self.log.too_long += 1;
             }
-            Err(RunFailure::TooLarge(_)) => self.ended += 1,
-            _ => self.ended = 0,
+            Err(RunFailure::MemoryExceeded(_)) => self.consecutive_overruns += 1,
+            _ => self.consecutive_overruns = 0,
         }
         self.usage.set_sizes(self.twin, &self.log);
-        attempt.map_err(|failure| self.failed(&failure, size))
+        attempt.map_err(|failure| self.run_error(&failure, size))
     }
 
-    /// Sizes that the model takes, for an image of this size, as far as they are known by now.
+    /// Sizes that the model accepts, as far as graph, convention and earlier trials show, for an image of this height and width.
     fn rule(&self, size: [usize; 2]) -> SizeRule {
         let signature = &self.graph.signature;
         let fixed = [signature.height, signature.width];
-        let mut rule = SizeRule::new(fixed, &self.graph.convention, self.graph.feeding.pad);
+        let mut rule = SizeRule::new(fixed, &self.graph.convention, self.graph.encoding.pad);
         match self.search.found() {
-            Some(TakenSizes::Multiple(multiple)) if self.refused.contains(&size) => {
+            Some(AcceptedSizes::Multiple(multiple)) if self.refused.contains(&size) => {
                 rule.multiple = multiple;
             }
-            Some(TakenSizes::Traced(traced)) => rule.fixed = traced.map(Some),
+            Some(AcceptedSizes::Traced(traced)) => rule.fixed = traced.map(Some),
             _ => {}
         }
         rule
     }
 
-    /// Enhances an image at whose own size the model failed: in sizes that are found by trial.
-    fn in_another_size(&mut self, image: &Rgb, failure: RunFailure) -> Result<Attempt> {
+    /// Enhances an image at a size found by trial, after `failure` at the image's own size.
+    fn attempt_at_found_size(&mut self, image: &Rgb, failure: RunFailure) -> Result<Attempt> {
         let size = [image.height(), image.width()];
         let rule = self.rule(size);
         if !rule.takes_any_size() {
@@ -271,27 +274,27 @@ impl Enhancer {
         let found = self.search.run(&self.graph)?;
         self.graph.restart_clock();
         match (found, self.graph.convention.multiple) {
-            (Some(found), Some(stated)) => Err(self.fault(format!(
+            (Some(found), Some(stated)) => Err(self.error(format!(
                 "{}; `multiple = {stated}` in MODEL.onnx.toml or the preset does not fit: {}",
-                failure.words(),
-                found.words()
+                failure.message(),
+                found.message()
             ))),
             (None, Some(_)) => Ok(Err(failure)),
             (Some(found), None) => {
                 self.refused.insert(size);
                 if is_new {
-                    let words = sidecar::named(&found.words(), &self.path);
+                    let words = sidecar::insert_sidecar_name(&found.message(), &self.path);
                     tracing::warn!("{}: {words}", self.path.display());
                 }
                 self.attempt(image, self.rule(size))
             }
-            (None, None) => self.filled_by_trial(image, failure),
+            (None, None) => self.attempt_padded(image, failure),
         }
     }
 
-    /// Enhances an image filled to the first multiple at which the model runs, though it needs none in general: it may be too
-    /// small for it.
-    fn filled_by_trial(&mut self, image: &Rgb, failure: RunFailure) -> Result<Attempt> {
+    /// Enhances an image padded to the first multiple at which the model runs. This helps with images that are too small for a model
+    /// that accepts any larger size.
+    fn attempt_padded(&mut self, image: &Rgb, failure: RunFailure) -> Result<Attempt> {
         let size = [image.height(), image.width()];
         let mut tried = vec![size];
         for multiple in MULTIPLES {
@@ -299,7 +302,7 @@ impl Enhancer {
                 multiple,
                 ..self.rule(size)
             };
-            let whole = rule.whole(size);
+            let whole = rule.run_size(size);
             if !tried.contains(&whole) {
                 tried.push(whole);
                 if let Ok(enhanced) = self.attempt(image, rule)? {
@@ -310,119 +313,119 @@ impl Enhancer {
         Ok(Err(failure))
     }
 
-    /// Enhances an image by a rule of sizes.
+    /// Enhances an image whose input size follows `rule`.
     fn attempt(&mut self, image: &Rgb, mut rule: SizeRule) -> Result<Attempt> {
         let size = [image.height(), image.width()];
-        if let Some(smaller) = rule.reduced(size, self.max_side) {
-            let attempt = self.resized(image, rule, smaller)?;
+        if let Some(smaller) = rule.reduced_size(size, self.max_side) {
+            let attempt = self.attempt_resized(image, rule, smaller)?;
             self.log.reduced += usize::from(attempt.is_ok());
             return Ok(attempt);
         }
         let must_fit = rule.needs_locality(size);
         if must_fit && self.fitting == Fitting::Resize {
-            let attempt = self.resized(image, rule, rule.whole(size))?;
+            let attempt = self.attempt_resized(image, rule, rule.run_size(size))?;
             self.log.resized += usize::from(attempt.is_ok());
             return Ok(attempt);
         }
         let mut context = 0;
         if !rule.takes_any_size() {
-            self.check_memory(rule, rule.whole(size), size)?;
+            self.check_memory(rule, rule.run_size(size), size)?;
         }
         if must_fit {
             let found = self.context.measure(&self.graph, rule)?;
             self.log.reach = self.context.reach();
-            context = found.map_err(|why| self.fault(global(rule, size, &why)))?;
-            let tile = rule.whole([reach::FREE_SIDE; 2]);
+            context = found.map_err(|why| self.error(not_local(rule, size, &why)))?;
+            let tile = rule.run_size([reach::FREE_SIDE; 2]);
             let alignment = self.alignment(rule, tile, context)?;
             if alignment > 1 && rule.tile.is_none() {
-                // A pixel at another place of its block may see farther.
+                // The reach was measured at one position within a block of `alignment` pixels; at others it may be larger.
                 context += alignment - 1;
             }
             rule.multiple = alignment;
         }
         let mut plan =
-            SizePlan::new(size, rule, self.tiling, context).map_err(|e| self.no_plan(e))?;
+            SizePlan::new(size, rule, self.tiling, context).map_err(|e| self.plan_error(e))?;
         if rule.takes_any_size() && plan.seams == SeamRule::MustHold && plan.tiles.count() > 1 {
-            rule.multiple = self.alignment(rule, plan.fed(), plan.cut.context)?;
-            plan = SizePlan::new(size, rule, self.tiling, context).map_err(|e| self.no_plan(e))?;
+            rule.multiple = self.alignment(rule, plan.run_size(), plan.geometry.context)?;
+            plan =
+                SizePlan::new(size, rule, self.tiling, context).map_err(|e| self.plan_error(e))?;
         }
         if rule.takes_any_size() {
-            self.check_memory(rule, plan.fed(), size)?;
+            self.check_memory(rule, plan.run_size(), size)?;
         }
-        self.planned(image, rule, &plan)
+        self.attempt_planned(image, rule, &plan)
     }
 
-    /// The multiple at which tiles start: the stated one, or that which is found by trial.
+    /// Multiple of pixels at which tiles must start: the stated one, else measured by trial.
     fn alignment(&mut self, rule: SizeRule, tile: [usize; 2], context: usize) -> Result<usize> {
         if rule.multiple > 1 {
             return Ok(rule.multiple);
         }
-        let is_new = self.context.is_unaligned();
-        let found = self.context.alignment(&self.graph, tile, context)?;
+        let is_new = self.context.lacks_alignment();
+        let found = self.context.measure_alignment(&self.graph, tile, context)?;
         if is_new && found > 1 {
             let words = format!(
                 "its tiles must start at multiples of {found} pixels (found by trial); to confirm, {ADD}: `multiple = {found}`"
             );
-            let words = sidecar::named(&words, &self.path);
+            let words = sidecar::insert_sidecar_name(&words, &self.path);
             tracing::warn!("{}: {words}", self.path.display());
         }
         Ok(found)
     }
 
-    /// Refuses a large run that would need more memory than is available.
+    /// Refuses a large run on an input of height and width `fed` that would need more memory than is available.
     fn check_memory(&mut self, rule: SizeRule, fed: [usize; 2], size: [usize; 2]) -> Result<()> {
         let checked = self.memory.run(&self.graph, rule, fed, size)?;
         self.graph.restart_clock();
-        checked.map_err(|problem| self.fault(problem))
+        checked.map_err(|problem| self.error(problem))
     }
 
-    /// Enhances an image by its plan.
-    fn planned(&mut self, image: &Rgb, rule: SizeRule, plan: &SizePlan) -> Result<Attempt> {
+    /// Enhances an image tile by tile.
+    fn attempt_planned(&mut self, image: &Rgb, rule: SizeRule, plan: &SizePlan) -> Result<Attempt> {
         let size = [image.height(), image.width()];
-        let mut canvas = TiledImage::new(plan.cut.area);
+        let mut canvas = TiledImage::new(plan.geometry.area);
         let dark = DarkImage::new(image);
         for (row, column) in plan.tiles.tiles() {
-            let (input, output) = (
-                TileWindow::input_of(row, column),
-                TileWindow::output_of(row, column),
-            );
-            match self.graph.window(&dark, input, output)? {
+            let input = TileWindow::for_input(row, column);
+            let output = TileWindow::for_output(row, column);
+            match self.graph.run_window(&dark, input, output)? {
                 RunResult::Output(bytes) => canvas.add(row, column, &bytes),
                 RunResult::Failed(failure) => return Ok(Err(failure)),
-                RunResult::Unusable(values) => return Err(self.unusable(values, image)),
+                RunResult::Unusable(values) => return Err(self.invalid_values_error(values, image)),
             }
         }
         let (enhanced, seam) = canvas.finish(size);
-        if plan.seams == SeamRule::MustHold && !seam.holds() {
-            return Err(self.fault(seams_differ(rule, size, plan, seam)));
+        if plan.seams == SeamRule::MustHold && !seam.agrees() {
+            return Err(self.error(seams_differ(rule, size, plan, seam)));
         }
         count_planned(&mut self.log, size, rule, plan, seam);
         Ok(Ok(enhanced))
     }
 
-    /// Enhances an image that is resized to `fed`, and resizes the result back.
-    fn resized(&mut self, image: &Rgb, rule: SizeRule, fed: [usize; 2]) -> Result<Attempt> {
+    /// Resizes an image to `fed`, enhances it, and resizes the result back.
+    fn attempt_resized(&mut self, image: &Rgb, rule: SizeRule, fed: [usize; 2]) -> Result<Attempt> {
         self.check_memory(rule, fed, [image.height(), image.width()])?;
-        let planes = Planes::from_rgb(image).resized(fed[0], fed[1]);
-        let planes = planes.map_err(|e| self.fault(e))?;
-        let enhanced = match self.graph.planes(&planes)? {
+        let planes = Planes::from_rgb(image)
+            .resized(fed[0], fed[1])
+            .map_err(|e| self.error(e))?;
+        let enhanced = match self.graph.run_planes(&planes)? {
             RunResult::Output(planes) => planes,
             RunResult::Failed(failure) => return Ok(Err(failure)),
-            RunResult::Unusable(values) => return Err(self.unusable(values, image)),
+            RunResult::Unusable(values) => return Err(self.invalid_values_error(values, image)),
         };
-        let enhanced = enhanced.resized(image.height(), image.width());
-        let enhanced = enhanced.map_err(|e| self.fault(e))?;
         let enhanced = enhanced
-            .to_rgb(self.graph.reading.rounding)
-            .ok_or_else(|| self.fault("gave no pixels"))?;
+            .resized(image.height(), image.width())
+            .map_err(|e| self.error(e))?
+            .to_rgb(self.graph.decoding.rounding)
+            .ok_or_else(|| self.error("gave no pixels"))?;
         count_image(&mut self.log, rule);
         Ok(Ok(enhanced))
     }
 
-    fn no_plan(&self, problem: NoPlan) -> Error {
+    fn plan_error(&self, problem: PlanError) -> Error {
         match problem {
-            NoPlan::Other(problem) => self.fault(problem),
-            NoPlan::TileFlag(side) => Error::usage(
+            PlanError::Other(problem) => self.error(problem),
+            PlanError::TileFlag(side) => Error::usage(
                 "--llie-options tile",
                 format_args!(
                     "{side} is not possible: {} needs the whole image (tile = \"none\" in its .onnx.toml file or preset)",
@@ -432,33 +435,32 @@ impl Enhancer {
         }
     }
 
-    /// The error for an image of this size on which the model failed in every size that was tried.
-    fn failed(&self, failure: &RunFailure, size: [usize; 2]) -> Error {
+    /// Error for an image of this size, after `failure` at the last of the tried sizes.
+    fn run_error(&self, failure: &RunFailure, size: [usize; 2]) -> Error {
         let rule = self.rule(size);
-        self.fault(match failure {
+        self.error(match failure {
             RunFailure::NoMemory { requested, .. } if self.fails_when_small(rule, *requested) => format!(
                 "{} and on one of {}: its graph needs that memory at any size; export it again, or use a smaller model",
-                failure.words(),
-                by(rule.whole([SMALL; 2]))
+                failure.message(),
+                format_size(rule.run_size([SMALL_SIDE; 2]))
             ),
-            RunFailure::NoMemory { .. } => no_memory(failure, rule, size),
-            RunFailure::TooLong(_) | RunFailure::TooLarge(_) => failure.words(),
+            RunFailure::NoMemory { .. } => out_of_memory(failure, rule, size),
+            RunFailure::TimedOut(_) | RunFailure::MemoryExceeded(_) => failure.message(),
             _ if !rule.takes_any_size() => format!(
                 "{}; its graph or MODEL.onnx.toml fixes the size {}",
-                failure.words(),
-                by(rule.whole(size))
+                failure.message(),
+                format_size(rule.run_size(size))
             ),
-            _ => not_found(failure, &self.search),
+            _ => sizes_not_found(failure, &self.search),
         })
     }
 
-    /// Whether it needs as many bytes at once for a small image, and does not get them.
+    /// True if an allocation of the same number of bytes also fails for a small image.
     fn fails_when_small(&self, rule: SizeRule, bytes: Option<u64>) -> bool {
-        let size = rule.whole([SMALL; 2]);
+        let size = rule.run_size([SMALL_SIDE; 2]);
         self.graph.restart_clock();
         let image = Rgb::black(size[0], size[1]);
-        let ran = self.graph.probe(&image, TileWindow::whole(size));
-        match ran {
+        match self.graph.probe(&image, TileWindow::whole(size)) {
             Ok(RunResult::Failed(RunFailure::NoMemory { requested, .. })) => {
                 requested.is_some() && requested == bytes
             }
@@ -466,15 +468,20 @@ impl Enhancer {
         }
     }
 
-    pub(super) fn fault(&self, problem: impl AsRef<str>) -> Error {
+    /// Error about this model; `problem` follows the file's name.
+    pub(super) fn error(&self, problem: impl AsRef<str>) -> Error {
         Error::Enhancer {
             path: self.path.clone(),
-            problem: sidecar::named(problem.as_ref(), &self.path),
+            problem: sidecar::insert_sidecar_name(problem.as_ref(), &self.path),
         }
     }
 
-    fn unusable(&self, values: OutOfRange, image: &Rgb) -> Error {
+    fn invalid_values_error(&self, values: InvalidValues, image: &Rgb) -> Error {
         let size = [image.height(), image.width()];
-        self.fault(unusable(values, self.graph.reading.range(), size))
+        self.error(describe_invalid_values(
+            values,
+            self.graph.decoding.range(),
+            size,
+        ))
     }
 }

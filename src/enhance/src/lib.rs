@@ -12,22 +12,22 @@
 //! rare:
 //!
 //! ```text
-//! window ─ [input = EXPRESSION] ─ [luma] ─ range, mean, std ─► Feeding      ─┐
+//! window ─ [input = EXPRESSION] ─ [luma] ─ range, mean, std ─► InputEncoding      ─┐
 //! number, map, noise, from = EXPRESSION ────────────────────► FurtherInput ─┴─► Graph
-//! Graph ─► OutputReading (range) ─ [image = EXPRESSION] ─ [luma] ─ clamp, rounding ─► Composition
+//! Graph ─► OutputDecoding (range) ─ [image = EXPRESSION] ─ [luma] ─ clamp, rounding ─► Composition
 //! ```
 //!
-//! [`ModelFile::read`] needs no runtime: a file that is not an ONNX model
-//! is refused before anything is searched or installed, and a resumed run knows its digest.
+//! [`ModelFile::read`] works without ONNX Runtime, so a file that is not an ONNX model is refused before a library is searched or
+//! installed, and a resumed run can compare the model's digest.
 //!
-//! [`Enhancer::enhance`] makes a plan for the size of an image (`sizing`): whole, padded, in tiles, or resized if a flag allows it.
-//! Properties that a graph does not declare are found by trial: the multiple or the traced size that it accepts (`sizing/size_search`,
-//! `files/frozen`), and how far a pixel sees (`sizing/reach`). Memory is estimated before and time is limited (`limits`), and a library is
-//! checked before it is loaded (`libraries`).
+//! [`Enhancer::enhance`] plans how an image reaches the model (`sizing`): whole, padded, in tiles, or resized if a flag allows it.
+//! Properties that a graph does not declare are found by trial: the accepted multiple or traced size (`sizing/size_search`,
+//! `files/traced_sizes`), and the distance up to which pixels influence each other (`sizing/reach`). `limits` estimates the memory of a run
+//! in advance and limits its time; `libraries` checks a library before loading it.
 //!
 //! A wrong convention gives a wrong image and no error. So a model is tried on dark frames before a run ([`Enhancer::probe`]), and its
-//! images are checked during it ([`Usage::judge`]), both by the rules in `probes/plausible`. `probes/doctor` shows the model's images with
-//! each convention.
+//! images are checked during the run ([`Usage::judge`]), both by the rules in `probes/plausible`. `probes/doctor` draws the model's images
+//! in each convention.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test may panic"))]
 
@@ -63,6 +63,6 @@ pub use probes::{
 pub use settings::{EnhancerArgs, ProbeArgs, RuntimeArgs, SizeArgs};
 pub use sizing::Tiling;
 
-/// Version of feeding and reading models, raised whenever a pixel changes, so that results of an older version are not
-/// reused.
+/// Version of the input encoding and output decoding. It is raised whenever an enhanced pixel changes, so that stored results of
+/// older versions are not reused.
 pub const VERSION: u32 = 2;

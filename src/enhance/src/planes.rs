@@ -1,4 +1,4 @@
-//! Images of floats, for models of a fixed size, and for expressions: [`Planes`].
+//! Planar images of 32-bit floats, for resizing and expressions: [`Planes`].
 
 use image::imageops::{FilterType, resize};
 use image::{ImageBuffer, Luma};
@@ -7,7 +7,7 @@ use super::conventions::{Channels, Rounding};
 use super::expressions::Sample;
 use darkqa_ground::types::Rgb;
 
-/// Image of planes, one after the other, with samples in 0..1: red, green and blue, or a single one.
+/// Planar image with samples in 0..1: red, green and blue planes, or a single plane.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Planes {
     pub(super) height: usize,
@@ -39,20 +39,24 @@ impl Planes {
         [self.height, self.width]
     }
 
-    /// The image with another luma, a single plane: the difference is added to each channel, which keeps the chroma.
+    /// The image with its luma replaced by the single plane `luma`. The difference is added to each channel, which keeps the chroma.
     pub(super) fn with_luma(&self, luma: &Self) -> Self {
         let plane = self.height * self.width;
         let changes: Vec<f32> = (0..plane)
             .map(|pixel| luma.samples[pixel] - self.sample(pixel).luma())
             .collect();
-        let samples = self.samples.iter().zip(changes.iter().cycle());
         Self {
-            samples: samples.map(|(sample, change)| sample + change).collect(),
+            samples: self
+                .samples
+                .iter()
+                .zip(changes.iter().cycle())
+                .map(|(sample, change)| sample + change)
+                .collect(),
             ..*self
         }
     }
 
-    /// Value of a pixel, counted row by row.
+    /// Value of the pixel with this index, counted row by row.
     pub(super) fn sample(&self, pixel: usize) -> Sample {
         let plane = self.height * self.width;
         match self.samples.get(2 * plane + pixel) {
@@ -61,7 +65,7 @@ impl Planes {
         }
     }
 
-    /// The image with three planes; a single one is copied.
+    /// The image with three planes; a single plane is repeated.
     pub(super) fn spread(mut self) -> Self {
         if self.samples.len() == self.height * self.width {
             self.samples = self.samples.repeat(3);
@@ -74,49 +78,44 @@ impl Planes {
         match channels {
             Channels::Rgb => self,
             Channels::Y => {
-                let pixels = 0..self.height * self.width;
-                let samples = pixels.map(|pixel| self.sample(pixel).luma()).collect();
+                let samples = (0..self.height * self.width)
+                    .map(|pixel| self.sample(pixel).luma())
+                    .collect();
                 Self { samples, ..self }
             }
         }
     }
 
-    /// The image in bytes: each sample is clamped to 0..1 and multiplied by 255. `None` if there is no pixel.
+    /// The image in bytes: each sample is clamped to 0..1 and multiplied by 255. `None` for an image without pixels.
     pub(super) fn to_rgb(&self, rounding: Rounding) -> Option<Rgb> {
         let plane = self.height * self.width;
-        let byte = |sample: f32| {
-            let code = sample.clamp(0.0, 1.0) * 255.0;
-            match rounding {
-                Rounding::Round => code.round() as u8,
-                Rounding::Truncate => code as u8,
-            }
-        };
         let mut samples = vec![0; 3 * plane];
         for (channel, plane) in self.samples.chunks_exact(plane).take(3).enumerate() {
             for (pixel, sample) in samples.chunks_exact_mut(3).zip(plane) {
-                pixel[channel] = byte(*sample);
+                let code = sample.clamp(0.0, 1.0) * 255.0;
+                pixel[channel] = match rounding {
+                    Rounding::Round => code.round() as u8,
+                    Rounding::Truncate => code as u8,
+                };
             }
         }
         Rgb::new(self.height, self.width, samples).ok()
     }
 
-    /// The image in another size, for models of a fixed size; its samples are clamped to 0..1 first.
+    /// The image resized to another height and width; its samples are clamped to 0..1 first.
     ///
-    /// The filter is bilinear, widened by the ratio if the image shrinks. Unlike sharper filters it stays within the image's
-    /// values, so it makes neither haloes nor samples out of range. Samples stay floats, because in bytes the few codes of a
-    /// dark image would be rounded twice.
+    /// The filter is bilinear, with its support widened by the ratio when the image shrinks. Unlike sharper filters it never leaves the
+    /// range of the image's values, so it makes no haloes. Samples stay floats, because the few codes of a dark image would be rounded
+    /// twice in bytes.
     pub(super) fn resized(&self, height: usize, width: usize) -> Result<Self, String> {
-        let side = |size: usize| u32::try_from(size).map_err(|e| e.to_string());
-        let (from, to) = (
-            (side(self.width)?, side(self.height)?),
-            (side(width)?, side(height)?),
-        );
+        let (old_height, old_width) = (side_as_u32(self.height)?, side_as_u32(self.width)?);
+        let (new_height, new_width) = (side_as_u32(height)?, side_as_u32(width)?);
         let mut samples = Vec::with_capacity(3 * height * width);
         for plane in self.samples.chunks_exact(self.height * self.width) {
             let plane = plane.iter().map(|sample| sample.clamp(0.0, 1.0)).collect();
-            let plane = ImageBuffer::<Luma<f32>, Vec<f32>>::from_raw(from.0, from.1, plane)
+            let plane = ImageBuffer::<Luma<f32>, Vec<f32>>::from_raw(old_width, old_height, plane)
                 .ok_or("a plane has another size than its image")?;
-            samples.extend(resize(&plane, to.0, to.1, FilterType::Triangle).into_raw());
+            samples.extend(resize(&plane, new_width, new_height, FilterType::Triangle).into_raw());
         }
         Ok(Self {
             height,
@@ -124,6 +123,10 @@ impl Planes {
             samples,
         })
     }
+}
+
+fn side_as_u32(side: usize) -> Result<u32, String> {
+    u32::try_from(side).map_err(|e| e.to_string())
 }
 
 #[cfg(test)]

@@ -35,27 +35,27 @@ pub struct EnhancerArgs {
 }
 
 impl EnhancerArgs {
-    /// The images that are enhanced: those that are named, else those with noise.
+    /// Treatments whose images are enhanced: those of the flag, by default the noise variant.
     #[must_use]
     pub fn on(&self) -> TreatmentSet {
         self.llie_on.unwrap_or(TreatmentSet::NOISE)
     }
 
-    /// Whether no enhancer and no folder of enhanced images is named.
+    /// True if the flags name neither an enhancer nor a folder of enhanced images.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.llie.is_empty() && self.enhanced.is_empty()
     }
 
-    /// The same flags for a set in this light. If it is dark, the untouched photographs are enhanced by default.
+    /// The same flags with the default for a data set in this light: for photographs that are dark already, L0 is enhanced.
     #[must_use]
     pub fn for_set(self, set: SetLight) -> Self {
-        let of_set = match set {
+        let default = match set {
             SetLight::Lit => None,
             SetLight::Dark => Some(TreatmentSet::only(None)),
         };
         Self {
-            llie_on: self.llie_on.or(of_set),
+            llie_on: self.llie_on.or(default),
             ..self
         }
     }
@@ -80,7 +80,7 @@ pub struct SizeArgs {
 }
 
 impl SizeArgs {
-    /// How images reach an enhancer of a fixed size.
+    /// How images of other sizes reach an enhancer with a fixed size.
     #[must_use]
     pub fn fitting(&self) -> Fitting {
         if self.llie_resize {
@@ -102,7 +102,7 @@ pub struct ProbeArgs {
 }
 
 impl ProbeArgs {
-    /// Treatment of an enhancer with implausible images.
+    /// Whether an enhancer with implausible images is used.
     pub fn implausible(&self) -> Implausible {
         if self.llie_anyway {
             Implausible::Used
@@ -134,20 +134,20 @@ pub struct RuntimeArgs {
 }
 
 impl RuntimeArgs {
-    /// The memory that an enhancer may take.
+    /// Limit of the process's memory while an enhancer runs; automatic without the flag.
     pub fn memory_limit(&self) -> MemoryLimit {
         self.llie_max_memory.unwrap_or_else(MemoryLimit::automatic)
     }
 
-    /// The search that the flags and `ORT_DYLIB_PATH`, the variable of the `ort` crate, define.
+    /// Search for ONNX Runtime by the flags, else by the environment variable `ORT_DYLIB_PATH` of the `ort` crate.
     #[must_use]
     pub fn search(&self) -> RuntimeSearch {
-        let variable = || env::var_os("ORT_DYLIB_PATH").filter(|path| !path.is_empty());
         RuntimeSearch {
-            library: self
-                .ort_lib
-                .clone()
-                .or_else(|| variable().map(PathBuf::from)),
+            library: self.ort_lib.clone().or_else(|| {
+                env::var_os("ORT_DYLIB_PATH")
+                    .filter(|path| !path.is_empty())
+                    .map(PathBuf::from)
+            }),
             install: if self.offline {
                 Install::Offline
             } else {

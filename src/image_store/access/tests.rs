@@ -15,8 +15,25 @@ fn entry(bytes: usize) -> Entry {
     }
 }
 
-fn store(folder: &Path, most: u64) -> ImageStore {
-    ImageStore::open(folder, FolderAccess::Private, StoredKinds::Enhanced, most).unwrap()
+fn store(folder: &Path, capacity: u64) -> ImageStore {
+    ImageStore::open(
+        folder,
+        FolderAccess::Private,
+        StoredKinds::Enhanced,
+        capacity,
+    )
+    .unwrap()
+}
+
+/// File of the entry with this name.
+fn file(store: &ImageStore, name: &str) -> PathBuf {
+    store.folder.path(key(name).digest())
+}
+
+/// Total size of the store's files, in bytes.
+fn total_bytes(store: &ImageStore) -> u64 {
+    let files = store.folder.files().unwrap();
+    files.iter().map(|file| file.bytes).sum()
 }
 
 fn image(store: &ImageStore, name: &str) -> Option<Vec<u8>> {
@@ -39,19 +56,19 @@ fn two_stores_of_one_folder_share_their_images() {
 }
 
 #[test]
-fn a_damaged_and_an_exchanged_file_are_removed_and_counted() {
+fn damaged_and_exchanged_files_are_removed_and_counted() {
     let place = tempfile::tempdir().unwrap();
     let store = store(place.path(), 1 << 20);
-    let file = |name| store.folder.place(key(name).digest());
     store.put(&key("a"), &entry(9));
     store.put(&key("b"), &entry(12));
-    fs::copy(file("b"), file("a")).unwrap();
+    let [a, b] = ["a", "b"].map(|name| file(&store, name));
+    fs::copy(&b, &a).unwrap();
     assert_eq!(image(&store, "a"), None);
-    assert!(!file("a").exists());
+    assert!(!a.exists());
     assert_eq!(image(&store, "b"), Some(vec![7; 12]));
-    let mut bytes = fs::read(file("b")).unwrap();
+    let mut bytes = fs::read(&b).unwrap();
     bytes[3] ^= 1;
-    fs::write(file("b"), bytes).unwrap();
+    fs::write(&b, bytes).unwrap();
     assert_eq!(image(&store, "b"), None);
     assert_eq!(store.counts().damaged, 2);
     store.put(&key("b"), &entry(12));
@@ -59,7 +76,7 @@ fn a_damaged_and_an_exchanged_file_are_removed_and_counted() {
 }
 
 #[test]
-fn a_full_store_takes_no_more_until_something_was_long_unused() {
+fn full_store_refuses_entries_until_old_ones_can_be_evicted() {
     let place = tempfile::tempdir().unwrap();
     let room = 1000;
     let full = store(place.path(), room);
@@ -69,11 +86,7 @@ fn a_full_store_takes_no_more_until_something_was_long_unused() {
     let counts = full.counts();
     assert!(counts.written >= 1 && counts.left_out >= 4, "{counts:?}");
     assert_eq!(counts.written + counts.left_out, 8);
-    let bytes = |store: &ImageStore| -> u64 {
-        let files = store.folder.files().unwrap();
-        files.iter().map(|file| file.bytes).sum()
-    };
-    assert!(bytes(&full) <= room, "{}", bytes(&full));
+    assert!(total_bytes(&full) <= room, "{}", total_bytes(&full));
     for file in full.folder.files().unwrap() {
         let old = SystemTime::now() - Duration::from_hours(24 * 15);
         let file = File::options().write(true).open(file.path).unwrap();
@@ -81,11 +94,11 @@ fn a_full_store_takes_no_more_until_something_was_long_unused() {
     }
     full.put(&key("h"), &entry(200));
     assert_eq!(image(&full, "h"), Some(vec![7; 200]));
-    assert!(full.counts().evicted > 0 && bytes(&full) <= room);
+    assert!(full.counts().evicted > 0 && total_bytes(&full) <= room);
 }
 
 #[test]
-fn a_folder_that_is_deleted_meanwhile_is_made_again() {
+fn deleted_folder_is_created_again() {
     let place = tempfile::tempdir().unwrap();
     let folder = place.path().join("store");
     let store = store(&folder, 1 << 20);
@@ -97,39 +110,40 @@ fn a_folder_that_is_deleted_meanwhile_is_made_again() {
 }
 
 #[test]
-fn a_store_that_cannot_be_written_to_is_left_alone() {
+fn store_that_cannot_be_used_is_ignored() {
     let place = tempfile::tempdir().unwrap();
     let store = store(place.path(), 1 << 20);
     let root = store.folder.root().to_owned();
     fs::remove_dir_all(&root).unwrap();
     fs::write(&root, "a file in the place of the folder").unwrap();
     store.put(&key("a"), &entry(9));
-    assert_eq!(store.with(|state| state.health), Health::ReadOnly);
+    assert_eq!(store.with_state(|state| state.health), Health::ReadOnly);
     assert_eq!(image(&store, "a"), None);
-    assert_eq!(store.with(|state| state.health), Health::Gone);
+    assert_eq!(store.with_state(|state| state.health), Health::Unusable);
     assert_eq!(store.counts().written, 0);
+}
+
+#[cfg(unix)]
+fn mode(path: &Path) -> u32 {
+    use std::os::unix::fs::PermissionsExt as _;
+    fs::metadata(path).unwrap().permissions().mode() & 0o777
 }
 
 #[cfg(unix)]
 #[test]
 fn only_the_user_can_enter_the_folder() {
-    use std::os::unix::fs::PermissionsExt as _;
     let place = tempfile::tempdir().unwrap();
     let store = store(&place.path().join("store"), 1 << 20);
-    let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode() & 0o777;
     assert_eq!(mode(store.folder.root()), 0o700);
-    // Also where it was deleted meanwhile.
+    // The same after the folder was deleted and created again.
     fs::remove_dir_all(place.path().join("store")).unwrap();
     store.put(&key("a"), &entry(9));
     assert_eq!(mode(store.folder.root()), 0o700);
-    assert_eq!(
-        mode(store.folder.place(key("a").digest()).parent().unwrap()),
-        0o700
-    );
+    assert_eq!(mode(file(&store, "a").parent().unwrap()), 0o700);
 }
 
 #[test]
-fn facts_alone_are_kept_beside_images_and_not_counted_as_images() {
+fn entries_without_an_image_are_counted_separately() {
     let place = tempfile::tempdir().unwrap();
     let store = store(place.path(), 1 << 20);
     let shown = Shown {

@@ -102,7 +102,7 @@ impl EnhancedImages {
             name: args.name.clone(),
             folder: args.folder.clone(),
             files,
-            usage: Usage::made_elsewhere(),
+            usage: Usage::for_external(),
         })
     }
 
@@ -164,8 +164,8 @@ impl EnhancedImages {
             let problem = "has another size than its dark image; nothing is resized";
             return Err(Error::data(place.display(), problem));
         }
-        let used = ImageUse::made_elsewhere([degraded, &image]);
-        used.note_made_elsewhere(&self.usage, &self.folder, [frame, condition], implausible)?;
+        let used = ImageUse::for_external([degraded, &image]);
+        used.record_external(&self.usage, &self.folder, [frame, condition], implausible)?;
         Ok((image, used))
     }
 

@@ -96,7 +96,7 @@ impl Model {
     /// If a number of the sidecar is infinite or NaN.
     pub(crate) fn stated(&self) -> Result<Digest> {
         match self {
-            Self::File(file) => file.stated(),
+            Self::File(file) => file.probe_digest(),
             Self::Open(_, stated) => Ok(*stated),
         }
     }
@@ -151,7 +151,7 @@ impl<'a> EnhancerModels<'a> {
             .into_iter()
             .map(|model| match model {
                 Model::File(file) => {
-                    let stated = file.stated()?;
+                    let stated = file.probe_digest()?;
                     Ok(Model::Open(self.settings.open(file)?, stated))
                 }
                 open @ Model::Open(..) => Ok(open),

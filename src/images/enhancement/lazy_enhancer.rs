@@ -65,11 +65,11 @@ impl LazyEnhancer {
         &self.usage
     }
 
-    /// Opens the enhancer if necessary and calls [`Enhancer::enhance_noted`].
+    /// Opens the enhancer if necessary and calls [`Enhancer::enhance_and_judge`].
     ///
     /// # Errors
     /// If it cannot be opened (which ends the run), or fails on the image.
-    pub(crate) fn enhance_noted(
+    pub(crate) fn enhance_and_judge(
         &self,
         image: &Rgb,
         place: [&dyn ToString; 2],
@@ -86,7 +86,7 @@ impl LazyEnhancer {
             };
         }
         match &mut *session {
-            Session::Open(enhancer) => enhancer.enhance_noted(image, place, implausible),
+            Session::Open(enhancer) => enhancer.enhance_and_judge(image, place, implausible),
             Session::Closed(_) => Err(self.ended("was not opened")),
             Session::Failed(problem) => Err(self.ended(problem)),
         }
@@ -97,7 +97,7 @@ impl LazyEnhancer {
             return Err(self.ended("is in use"));
         };
         let enhancer = self.settings.open(file)?;
-        let enhancer = enhancer.tried_before(&self.findings, self.usage.clone())?;
+        let enhancer = enhancer.with_findings(&self.findings, self.usage.clone())?;
         let stopper = self.stopper.get_or_init(|| enhancer.stopper());
         if self.is_stopped.load(Ordering::SeqCst) {
             stopper.stop();

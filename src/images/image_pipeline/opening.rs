@@ -66,7 +66,7 @@ impl<'a> ImagePipeline<'a> {
                 (StoredState::All(findings) | StoredState::Findings(findings), model) => {
                     findings.warn(model.name(), model.path());
                     let enhancer = model.open(settings)?;
-                    let enhancer = enhancer.tried_before(&findings, findings.usage())?;
+                    let enhancer = enhancer.with_findings(&findings, findings.usage())?;
                     self.enhancers.push(enhancer);
                 }
                 (StoredState::Nothing(place), model) => {

@@ -24,7 +24,7 @@ impl ImagePipeline<'_> {
     pub(crate) fn check<I>(&mut self, sources: &[Source], plan: &[SourcePlan<I>]) -> Result<()> {
         self.try_enhancers(sources, plan)?;
         // Test images do not count as images of the run.
-        self.enhancers.iter_mut().for_each(Enhancer::count_anew);
+        self.enhancers.iter_mut().for_each(Enhancer::reset_counts);
         if let Some(limit) = self.steps.limit {
             warn_about_large_images(self.check_largest_image(sources, plan)?.as_ref(), limit);
         }

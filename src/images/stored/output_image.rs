@@ -40,7 +40,7 @@ pub(crate) struct Sidecar<R> {
     pub(crate) recipe: R,
     /// Why the image may be wrong (`--allow bad-enhancer`). Depends on all images of a call and does not affect the pixels.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    used_anyway: Option<String>,
+    overruled_problem: Option<String>,
     /// The image file; `None` in sidecars of the first schema.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     output: Option<OutputFile>,
@@ -119,7 +119,7 @@ impl<R: ImageOrigin> Sidecar<R> {
             schema: R::SCHEMAS[0].to_owned(),
             darkqa_eval: env!("CARGO_PKG_VERSION").to_owned(),
             recipe,
-            used_anyway: place.used_anyway.clone(),
+            overruled_problem: place.overruled_problem.clone(),
             output: Some(OutputFile::new(&place.image, bytes)),
         }
     }
@@ -215,7 +215,7 @@ pub(crate) struct OutputImage {
     /// True if existing files are overwritten.
     is_forced: bool,
     /// Why the image may be wrong; written to the sidecar.
-    used_anyway: Option<String>,
+    overruled_problem: Option<String>,
 }
 
 impl OutputImage {
@@ -226,14 +226,14 @@ impl OutputImage {
             image,
             json,
             is_forced,
-            used_anyway: None,
+            overruled_problem: None,
         }
     }
 
     /// Sets the reason why the image may be wrong.
-    pub(crate) fn with_used_anyway(self, used_anyway: Option<String>) -> Self {
+    pub(crate) fn with_overruled_problem(self, overruled_problem: Option<String>) -> Self {
         Self {
-            used_anyway,
+            overruled_problem,
             ..self
         }
     }

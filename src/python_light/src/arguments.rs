@@ -1,4 +1,4 @@
-//! Python values → settings: [`Settings`], [`Level`], [`noise_keys`].
+//! Conversion of Python arguments to settings: [`Settings`], [`Level`], [`noise_keys`].
 
 use std::path::PathBuf;
 
@@ -15,7 +15,7 @@ use pyo3::types::{PyBool, PyFloat, PyInt, PyString};
 use crate::arrays::Batch;
 use crate::errors::{value_error, wrong_type};
 
-/// A level; `None` is L0, the image itself.
+/// A level of darkness; `None` is L0, the unchanged image.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Level(pub(crate) Option<Severity>);
 
@@ -27,7 +27,7 @@ pub(crate) struct Settings {
     auto: AutoExposure,
 }
 
-/// A text argument.
+/// Converts a `str` argument.
 fn text(name: &str, expected: &str, given: &Bound<'_, PyAny>) -> PyResult<String> {
     let text = given
         .cast::<PyString>()
@@ -38,13 +38,14 @@ fn text(name: &str, expected: &str, given: &Bound<'_, PyAny>) -> PyResult<String
     Ok(text.to_owned())
 }
 
-/// A number of EV that is finite; a bool is none.
+/// Converts a number of EV; refuses `bool` and `str`.
 fn number(name: &str, given: &Bound<'_, PyAny>) -> PyResult<f64> {
-    let wrong = || wrong_type(name, "a number of EV", given);
-    if given.is_instance_of::<PyBool>() || given.is_instance_of::<PyString>() {
-        return Err(wrong());
-    }
-    given.extract().map_err(|_| wrong())
+    let is_refused = given.is_instance_of::<PyBool>() || given.is_instance_of::<PyString>();
+    given
+        .extract()
+        .ok()
+        .filter(|_| !is_refused)
+        .ok_or_else(|| wrong_type(name, "a number of EV", given))
 }
 
 impl Settings {
@@ -90,7 +91,7 @@ impl Settings {
         };
         let seed = match seed {
             None => 0,
-            Some(given) => whole("seed", given, [0, u64::MAX])?,
+            Some(given) => integer("seed", given, [0, u64::MAX])?,
         };
         Ok(Self {
             kind,
@@ -100,7 +101,7 @@ impl Settings {
         })
     }
 
-    /// The level of the arguments `level` and `ev`; L3 if neither is given.
+    /// Level from the arguments `level` and `ev`, of which only one may be given; L3 by default.
     pub(crate) fn level(
         &self,
         level: Option<&Bound<'_, PyAny>>,
@@ -110,34 +111,39 @@ impl Settings {
             (Some(_), Some(_)) => Err(PyValueError::new_err(
                 "level, ev: one of them expected, got both",
             )),
-            (None, Some(ev)) => self.drop("ev", ev),
-            (Some(level), None) => self.named("level", level),
-            (None, None) => self.label("level", "L3"),
+            (None, Some(ev)) => self.level_from_ev("ev", ev),
+            (Some(level), None) => self.level_from_str("level", level),
+            (None, None) => self.level_from_label("level", "L3"),
         }
     }
 
-    /// The levels of a ladder; L1 to L5 if none are given.
+    /// Levels of a ladder; L1 to L5 by default.
     pub(crate) fn levels(&self, levels: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<Level>> {
         let Some(levels) = levels else {
-            let ladder = self.kind.ladder().iter();
-            return Ok(ladder.map(|severity| Level(Some(*severity))).collect());
+            return Ok(self
+                .kind
+                .ladder()
+                .iter()
+                .map(|severity| Level(Some(*severity)))
+                .collect());
         };
         let expected = "a list of str and numbers of EV";
         if levels.is_instance_of::<PyString>() {
             return Err(wrong_type("levels", expected, levels));
         }
-        let items = levels
+        let levels: Vec<Level> = levels
             .try_iter()
-            .map_err(|_| wrong_type("levels", expected, levels))?;
-        let levels = items.map(|item| {
-            let item = item?;
-            if item.is_instance_of::<PyString>() {
-                self.named("levels", &item)
-            } else {
-                self.drop("levels", &item)
-            }
-        });
-        let levels: Vec<Level> = levels.take(MAX_LEVELS + 1).collect::<PyResult<_>>()?;
+            .map_err(|_| wrong_type("levels", expected, levels))?
+            .map(|item| {
+                let item = item?;
+                if item.is_instance_of::<PyString>() {
+                    self.level_from_str("levels", &item)
+                } else {
+                    self.level_from_ev("levels", &item)
+                }
+            })
+            .take(MAX_LEVELS + 1)
+            .collect::<PyResult<_>>()?;
         if levels.is_empty() || levels.len() > MAX_LEVELS {
             let problem = format!("levels: from 1 to {MAX_LEVELS} levels expected");
             return Err(PyValueError::new_err(problem));
@@ -145,29 +151,27 @@ impl Settings {
         Ok(levels)
     }
 
-    fn named(&self, name: &str, given: &Bound<'_, PyAny>) -> PyResult<Level> {
+    /// Level from the `str` argument `name`.
+    fn level_from_str(&self, name: &str, given: &Bound<'_, PyAny>) -> PyResult<Level> {
         let is_number = given.is_instance_of::<PyFloat>() || given.is_instance_of::<PyInt>();
         let expected = if is_number {
             "a str such as \"L3\" (a number of EV is the argument ev)"
         } else {
             "a str such as \"L3\""
         };
-        self.label(name, &text(name, expected, given)?)
+        self.level_from_label(name, &text(name, expected, given)?)
     }
 
-    fn label(&self, name: &str, label: &str) -> PyResult<Level> {
+    /// Level with a label such as `L3` or `E3.3`; `name` is the argument's.
+    fn level_from_label(&self, name: &str, label: &str) -> PyResult<Level> {
         if label.eq_ignore_ascii_case("L0") {
             return Ok(Level(None));
         }
-        // Exposure times have no names of their own; L1 to L5 are those of the ladder.
-        let of_ladder = self
-            .kind
-            .ladder()
-            .iter()
-            .zip(1..)
-            .find(|(_, index)| label.eq_ignore_ascii_case(&format!("L{index}")));
-        if let Some((severity, _)) = of_ladder {
-            return Ok(Level(Some(*severity)));
+        // L1 to L5 are the severities of the variant's ladder, also for exposure times.
+        for (severity, index) in self.kind.ladder().iter().zip(1..) {
+            if label.eq_ignore_ascii_case(&format!("L{index}")) {
+                return Ok(Level(Some(*severity)));
+            }
         }
         let severity = self.kind.severity(label).map_err(|_| {
             let expected = if self.kind.axis() == Axis::MOTION {
@@ -180,8 +184,8 @@ impl Settings {
         Ok(Level(Some(severity)))
     }
 
-    /// An exposure drop in EV, rounded to hundredths.
-    fn drop(&self, name: &str, given: &Bound<'_, PyAny>) -> PyResult<Level> {
+    /// Level from an exposure drop in EV, rounded to hundredths.
+    fn level_from_ev(&self, name: &str, given: &Bound<'_, PyAny>) -> PyResult<Level> {
         let drop_ev = number(name, given)?;
         if self.kind.axis() != Axis::LIGHT {
             let problem = format!(
@@ -202,10 +206,10 @@ impl Settings {
         ))
     }
 
-    /// The width of the images, which only motion depends on.
+    /// Width of the images in pixels, which affects only motion blur.
     pub(crate) fn width(&self, given: Option<&Bound<'_, PyAny>>) -> PyResult<usize> {
         match given {
-            Some(given) => Ok(whole("width", given, [1, MAX_WIDTH])? as usize),
+            Some(given) => Ok(integer("width", given, [1, MAX_WIDTH])? as usize),
             None if self.kind.has_motion() => Err(PyValueError::new_err(format!(
                 "width: the width of the image in pixels expected, because variant {:?} has motion blur",
                 self.kind.word()
@@ -214,7 +218,7 @@ impl Settings {
         }
     }
 
-    /// A degradation of the frame of a key, `width` pixels wide.
+    /// Degradation of a frame with this key and width in pixels.
     pub(crate) fn applied(
         &self,
         severity: Severity,
@@ -231,7 +235,7 @@ impl Settings {
             .map_err(|problem| value_error(&problem))
     }
 
-    /// The state of the capture of a frame. At L0 it has no sensor: the image itself.
+    /// Capture state of a frame with this key and width in pixels. At L0 it has no sensor, because the image is unchanged.
     pub(crate) fn state(
         &self,
         level: Level,
@@ -250,10 +254,10 @@ impl Settings {
     }
 }
 
-/// Greatest width of an image, in pixels; chosen.
+/// Maximum width of an image, in pixels; chosen.
 const MAX_WIDTH: u64 = 1 << 30;
 
-/// Most levels of a ladder; chosen.
+/// Maximum number of levels of a ladder; chosen.
 const MAX_LEVELS: usize = 200;
 
 fn one_of(name: &str, given: &str, accepted: &[&str]) -> PyErr {
@@ -261,7 +265,7 @@ fn one_of(name: &str, given: &str, accepted: &[&str]) -> PyErr {
     PyValueError::new_err(format!("{name}: one of {accepted} expected, got {given:?}"))
 }
 
-/// A bool of Python or NumPy.
+/// Converts a `bool` of Python or NumPy.
 pub(crate) fn switch(
     name: &str,
     given: Option<&Bound<'_, PyAny>>,
@@ -275,26 +279,29 @@ pub(crate) fn switch(
         .map_err(|_| wrong_type(name, "a bool", given))
 }
 
-/// Most threads; chosen.
+/// Maximum number of threads; chosen.
 const MAX_THREADS: u64 = 256;
 
-/// The number of threads; 1 if it is not given.
+/// Number of threads; 1 by default.
 pub(crate) fn threads(given: Option<&Bound<'_, PyAny>>) -> PyResult<usize> {
-    let threads = given.map(|given| whole("threads", given, [1, MAX_THREADS]));
-    Ok(threads.transpose()?.unwrap_or(1) as usize)
+    match given {
+        Some(given) => Ok(integer("threads", given, [1, MAX_THREADS])? as usize),
+        None => Ok(1),
+    }
 }
 
-/// A whole number; a bool is none.
-fn whole(name: &str, given: &Bound<'_, PyAny>, [low, high]: [u64; 2]) -> PyResult<u64> {
+/// Converts an integer within bounds; refuses `bool`.
+fn integer(name: &str, given: &Bound<'_, PyAny>, [low, high]: [u64; 2]) -> PyResult<u64> {
     if given.is_instance_of::<PyBool>() {
         return Err(wrong_type(name, "an int", given));
     }
     let index = given
         .call_method0("__index__")
         .map_err(|_| wrong_type(name, "an int", given))?;
-    let number: Option<u64> = index.extract().ok();
-    number
-        .filter(|number| (low..=high).contains(number))
+    index
+        .extract()
+        .ok()
+        .filter(|number: &u64| (low..=high).contains(number))
         .ok_or_else(|| {
             PyValueError::new_err(format!(
                 "{name}: an int from {low} to {high} expected, got {index}"
@@ -302,16 +309,19 @@ fn whole(name: &str, given: &Bound<'_, PyAny>, [low, high]: [u64; 2]) -> PyResul
         })
 }
 
-/// The key of one image.
+/// Key of one image; empty by default.
 pub(crate) fn key(given: Option<&Bound<'_, PyAny>>) -> PyResult<String> {
-    given.map_or_else(|| Ok(String::new()), |given| text("key", "a str", given))
+    match given {
+        Some(given) => text("key", "a str", given),
+        None => Ok(String::new()),
+    }
 }
 
 pub(crate) fn noise_key(seed: u64, key: &str) -> NoiseKey {
     NoiseKey::new(seed, &FrameId(key.to_owned()))
 }
 
-/// The noise keys of the images of a batch: of a list of N keys, or of one text, to which a batch adds `/i` for image i.
+/// Noise keys of the images of a batch, from a list of N keys, or from one key to which `/i` is added for image i of a batch.
 pub(crate) fn noise_keys(
     seed: u64,
     given: Option<&Bound<'_, PyAny>>,
@@ -325,10 +335,9 @@ pub(crate) fn noise_keys(
         return Err(wrong_type("key", "a str", given));
     };
     let expected = "a str or a list of str";
-    let items = given
+    let keys: Vec<NoiseKey> = given
         .try_iter()
-        .map_err(|_| wrong_type("key", expected, given))?;
-    let keys: Vec<NoiseKey> = items
+        .map_err(|_| wrong_type("key", expected, given))?
         .take(count + 1)
         .map(|item| {
             let key = text("key", expected, &item?)?;
@@ -344,7 +353,7 @@ pub(crate) fn noise_keys(
     Ok(keys)
 }
 
-/// The noise keys of the images of a batch that has one text as its key.
+/// Noise keys of the images of a batch from one key, to which `/i` is added for image i.
 pub(crate) fn numbered_keys(seed: u64, key: &str, batch: &Batch) -> Vec<NoiseKey> {
     match batch.count() {
         None => vec![noise_key(seed, key)],

@@ -1,4 +1,4 @@
-//! NumPy arrays ↔ images: [`Batch`], [`to_numpy`].
+//! Conversion between NumPy arrays and images: [`Batch`], [`to_numpy`].
 
 use darkqa_ground::types::Rgb;
 use darkqa_ground::types::images::Sample;
@@ -11,22 +11,22 @@ use pyo3::prelude::*;
 
 use crate::errors::wrong_type;
 
-/// Most pixels of an image; chosen. An array of any size may be a view of a single sample.
+/// Maximum number of pixels of an image; chosen. Even a huge array can be a view of a single sample.
 const MAX_PIXELS: usize = 1 << 28;
 
-/// Bytes that an image takes besides its samples, at most.
-const BYTES_OF_IMAGE: usize = 128;
+/// Upper bound of the bytes that an image takes in addition to its samples.
+const IMAGE_OVERHEAD: usize = 128;
 
-/// A sample of an array that is returned.
+/// Element type of a returned array.
 pub(crate) trait Output: Sample + Element + Send + Sync {}
 
 impl Output for u8 {}
 impl Output for f32 {}
 
-/// The images of an argument.
+/// Images of the argument `image`.
 pub(crate) struct Batch {
     pub(crate) images: Vec<Rgb>,
-    /// Number of images, if it is an axis of the array.
+    /// Number of images; `None` for an array without a batch axis.
     count: Option<usize>,
     height: usize,
     pub(crate) width: usize,
@@ -36,7 +36,7 @@ impl Batch {
     /// Copies the images of an array of any memory layout.
     ///
     /// # Errors
-    /// `TypeError` if it is no array of `uint8`, `ValueError` if it has another shape or an image has no pixel.
+    /// `TypeError` if `image` is not an array of `uint8`, `ValueError` if it has another shape, no pixels or too many.
     pub(crate) fn read(image: &Bound<'_, PyAny>) -> PyResult<Self> {
         let untyped = image
             .cast::<PyUntypedArray>()
@@ -63,27 +63,29 @@ impl Batch {
             return Err(wrong_shape(shape, " with at most 2**28 pixels"));
         }
         let size = 3 * height * width;
-        // All samples, and those of each image.
+        // Twice the samples: a copy of the array, and the images.
         require_memory(count.unwrap_or(1), 2 * size)?;
-        let samples = samples(&array);
-        let images = samples.chunks_exact(size).map(|samples| {
-            Rgb::new(height, width, samples.to_vec())
-                .map_err(|problem| PyValueError::new_err(problem.to_string()))
-        });
+        let images = samples(&array)
+            .chunks_exact(size)
+            .map(|samples| {
+                Rgb::new(height, width, samples.to_vec())
+                    .map_err(|problem| PyValueError::new_err(problem.to_string()))
+            })
+            .collect::<PyResult<_>>()?;
         Ok(Self {
-            images: images.collect::<PyResult<_>>()?,
+            images,
             count,
             height,
             width,
         })
     }
 
-    /// Number of images; `None` for a single image without an axis for it.
+    /// Number of images; `None` for a single image without a batch axis.
     pub(crate) fn count(&self) -> Option<usize> {
         self.count
     }
 
-    /// The shape of an array with `levels` images for each image, if that is an axis.
+    /// Shape of the output array; `levels` is the length of the axis of levels, or empty without that axis.
     pub(crate) fn output_shape(&self, levels: &[usize]) -> Vec<usize> {
         let mut shape: Vec<usize> = self.count.into_iter().collect();
         shape.extend_from_slice(levels);
@@ -92,21 +94,22 @@ impl Batch {
     }
 }
 
-/// Holds the memory of as many images for a moment. A library that runs out of memory would end the interpreter.
+/// Checks that the memory for `images` images of `bytes` bytes each can be allocated, because an allocation that fails later would end the
+/// interpreter.
 ///
 /// # Errors
-/// `MemoryError` if the system does not have it.
+/// `MemoryError` if the allocation fails.
 pub(crate) fn require_memory(images: usize, bytes: usize) -> PyResult<()> {
-    let bytes = images.saturating_mul(bytes.saturating_add(BYTES_OF_IMAGE));
+    let bytes = images.saturating_mul(bytes.saturating_add(IMAGE_OVERHEAD));
     let mut memory: Vec<u8> = Vec::new();
     memory
         .try_reserve_exact(bytes)
         .map_err(|_| PyMemoryError::new_err(format!("image: {images} images take {bytes} bytes")))
 }
 
-/// The samples in the order of the axes.
+/// Samples of an array in C order.
 fn samples<'a>(array: &'a PyReadonlyArrayDyn<'_, u8>) -> std::borrow::Cow<'a, [u8]> {
-    // `as_slice` also returns the samples of arrays in the order of Fortran, as they lie in memory.
+    // `as_slice` also accepts arrays in Fortran order, and returns their samples in memory order.
     match array.as_slice() {
         Ok(samples) if array.is_c_contiguous() => samples.into(),
         _ => array.as_array().iter().copied().collect(),
@@ -121,7 +124,7 @@ fn wrong_shape(shape: &[usize], further: &str) -> PyErr {
     ))
 }
 
-/// A new array of this shape.
+/// New array of this shape.
 pub(crate) fn to_numpy<'py, T: Output>(
     py: Python<'py>,
     samples: Vec<T>,

@@ -1,12 +1,12 @@
-//! The Python module `darkqa_light`: dark images of NumPy arrays, by the crate `darkqa-light`.
+//! Python module `darkqa_light`: dark images from NumPy arrays, computed by the crate `darkqa-light`.
 //!
-//! - `lib.rs`: the four functions, as `darkqa_light/_core.pyi` types them.
-//! - [`arguments`]: Python values → settings; every wrong value is named in a `TypeError` or `ValueError`.
-//! - [`arrays`]: NumPy arrays ↔ images.
-//! - [`state`]: the dictionary of a capture.
-//! - [`pools`]: threads, one pool for each process and number of threads.
+//! - `lib.rs`: the Python functions, whose types are in `darkqa_light/_core.pyi`.
+//! - [`arguments`]: conversion of arguments to settings, with a `TypeError` or `ValueError` about each wrong value.
+//! - [`arrays`]: conversion between NumPy arrays and images.
+//! - [`state`]: conversion between capture states and dictionaries.
+//! - [`pools`]: thread pools, one for each process and number of threads.
 //!
-//! Images are made without the GIL.
+//! Images are computed without the GIL.
 
 mod arguments;
 mod arrays;
@@ -89,19 +89,18 @@ fn degrade<'py>(
         .iter()
         .map(|key| settings.state(level, batch.width, key))
         .collect::<PyResult<Vec<_>>>()?;
-    let capture = |index: usize| (&states[index], &keys[index]);
     if is_linear {
-        let make = |index: usize, clean: &Rgb| {
-            let (state, key) = capture(index);
-            state.light(clean.into(), key, noise).into_samples()
-        };
-        output(py, &batch, &[], threads, make)
+        output(py, &batch, &[], threads, |index, clean| {
+            states[index]
+                .light(clean.into(), &keys[index], noise)
+                .into_samples()
+        })
     } else {
-        let make = |index: usize, clean: &Rgb| {
-            let (state, key) = capture(index);
-            state.image(clean.into(), key, noise).into_samples()
-        };
-        output(py, &batch, &[], threads, make)
+        output(py, &batch, &[], threads, |index, clean| {
+            states[index]
+                .image(clean.into(), &keys[index], noise)
+                .into_samples()
+        })
     }
 }
 
@@ -137,37 +136,41 @@ fn ladder<'py>(
     let keys = noise_keys(settings.seed, key, &batch)?;
     let mut states: Vec<Vec<CaptureState>> = Vec::new();
     for key in &keys {
-        let of_key = levels
+        let states_of_key = levels
             .iter()
-            .map(|level| settings.state(*level, batch.width, key));
-        states.push(of_key.collect::<PyResult<_>>()?);
+            .map(|level| settings.state(*level, batch.width, key))
+            .collect::<PyResult<_>>()?;
+        states.push(states_of_key);
     }
     let shape = [levels.len()];
     if is_linear {
-        let make = |index: usize, clean: &Rgb| {
-            joined(
+        return output(py, &batch, &shape, threads, |index, clean| {
+            join_samples(
                 states[index]
                     .iter()
                     .map(|state| state.light(clean.into(), &keys[index], noise)),
             )
-        };
-        return output(py, &batch, &shape, threads, make);
+        });
     }
-    let make = |index: usize, clean: &Rgb| {
+    output(py, &batch, &shape, threads, |index, clean| {
         if noise == NoiseTerms::All {
-            return together(&settings, &levels, clean, &keys[index]);
+            return degrade_to_levels(&settings, &levels, clean, &keys[index]);
         }
-        joined(
+        join_samples(
             states[index]
                 .iter()
                 .map(|state| state.image(clean.into(), &keys[index], noise)),
         )
-    };
-    output(py, &batch, &shape, threads, make)
+    })
 }
 
-/// The samples of one frame at several levels, which share their work.
-fn together(settings: &Settings, levels: &[Level], clean: &Rgb, key: &NoiseKey) -> Vec<u8> {
+/// Samples of one frame at several levels with all noise terms, which share intermediate results.
+fn degrade_to_levels(
+    settings: &Settings,
+    levels: &[Level],
+    clean: &Rgb,
+    key: &NoiseKey,
+) -> Vec<u8> {
     if settings.kind == Kind::Sensor {
         let mut samples = vec![0; levels.len() * clean.samples().len()];
         let (mut severities, mut images) = (Vec::new(), Vec::new());
@@ -184,13 +187,13 @@ fn together(settings: &Settings, levels: &[Level], clean: &Rgb, key: &NoiseKey) 
         return samples;
     }
     let mut exposures = Exposures::default();
-    joined(levels.iter().map(|level| {
+    join_samples(levels.iter().map(|level| {
         let applied = level
             .0
             .map(|severity| settings.applied(severity, clean.width(), key));
         match applied {
             Some(Ok(applied)) => exposures.degrade(clean.into(), &applied, key),
-            // The states of all levels were made before, so that no level fails here.
+            // No level fails here, because the capture states of all levels were computed before.
             None | Some(Err(_)) => clean.clone(),
         }
     }))
@@ -261,17 +264,17 @@ fn replay<'py>(
     let keys = numbered_keys(replay.seed, &replay.key, &batch);
     let capture = &replay.capture;
     if is_linear {
-        let make = |index: usize, clean: &Rgb| {
-            let light = capture.light(clean.into(), &keys[index], noise);
-            light.into_samples()
-        };
-        output(py, &batch, &[], threads, make)
+        output(py, &batch, &[], threads, |index, clean| {
+            capture
+                .light(clean.into(), &keys[index], noise)
+                .into_samples()
+        })
     } else {
-        let make = |index: usize, clean: &Rgb| {
-            let image = capture.image(clean.into(), &keys[index], noise);
-            image.into_samples()
-        };
-        output(py, &batch, &[], threads, make)
+        output(py, &batch, &[], threads, |index, clean| {
+            capture
+                .image(clean.into(), &keys[index], noise)
+                .into_samples()
+        })
     }
 }
 
@@ -283,7 +286,7 @@ fn terms(noise: bool) -> NoiseTerms {
     }
 }
 
-/// The array of the samples that `make` makes of each image of a batch; `levels` is the number of its images, if it is an axis.
+/// Array of the samples that `make` computes from the index and pixels of each image of a batch. For `levels` see [`Batch::output_shape`].
 fn output<'py, T: Output>(
     py: Python<'py>,
     batch: &Batch,
@@ -292,7 +295,7 @@ fn output<'py, T: Output>(
     make: impl Fn(usize, &Rgb) -> Vec<T> + Sync,
 ) -> PyResult<Bound<'py, PyAny>> {
     let shape = batch.output_shape(levels);
-    // The images, each frame's images together, and all of them.
+    // Three copies at most: single images, the images of each frame joined, and all frames joined.
     let bytes = shape
         .iter()
         .fold(size_of::<T>(), |product, n| product.saturating_mul(*n));
@@ -315,8 +318,8 @@ fn output<'py, T: Output>(
     arrays::to_numpy(py, samples, &shape)
 }
 
-/// The samples of images of one size, one after the other.
-fn joined<T: Output>(images: impl Iterator<Item = Image<T>>) -> Vec<T> {
+/// Concatenated samples of images of one size.
+fn join_samples<T: Output>(images: impl Iterator<Item = Image<T>>) -> Vec<T> {
     images
         .map(Image::into_samples)
         .collect::<Vec<Vec<T>>>()

@@ -1,8 +1,8 @@
-//! Threads: [`pool`].
+//! Thread pools: [`pool`].
 //!
-//! A forked process has no threads of its parent's pools. So pools belong to a process, and are started when they are first
-//! needed: in each worker of a `DataLoader` anew. The table of pools and all tables that the synthesis computes once are
-//! only filled while the GIL is held, which `os.fork` holds, too: no fork finds a lock taken.
+//! The threads of a pool do not survive a fork. So each process, such as a worker of a `DataLoader`, starts its own pools when they are
+//! first needed. The table of pools, and the tables that the synthesis computes once, are filled only while the GIL is held. `os.fork`
+//! holds the GIL, too, so a forked process never inherits a locked mutex.
 
 use std::collections::HashMap;
 use std::process;
@@ -22,10 +22,10 @@ type Pools = HashMap<(u32, usize), Arc<ThreadPool>>;
 
 static POOLS: Mutex<Option<Pools>> = Mutex::new(None);
 
-/// The pool of this process with this many threads.
+/// Pool of this process with this number of threads.
 ///
 /// # Errors
-/// `RuntimeError` if the system refuses to start them.
+/// `RuntimeError` if the threads cannot be started.
 pub(crate) fn pool(_attached: Python<'_>, threads: usize) -> PyResult<Arc<ThreadPool>> {
     let mut pools = POOLS.lock().unwrap_or_else(PoisonError::into_inner);
     let is_first = pools.is_none();
@@ -34,7 +34,7 @@ pub(crate) fn pool(_attached: Python<'_>, threads: usize) -> PyResult<Arc<Thread
     if let Some(pool) = pools.get(&(process, threads)) {
         return Ok(Arc::clone(pool));
     }
-    // Pools of a parent are kept, because their threads cannot be joined here.
+    // Pools of a parent process stay in the table: dropping them would wait for threads that do not exist here.
     let pool = ThreadPoolBuilder::new()
         .num_threads(threads)
         .thread_name(|index| format!("darkqa-light-{index}"))
@@ -50,7 +50,7 @@ pub(crate) fn pool(_attached: Python<'_>, threads: usize) -> PyResult<Arc<Thread
     Ok(pool)
 }
 
-/// Makes a small image of each kind, so that all tables are computed.
+/// Computes a small image of each variant, so that all tables of the synthesis are filled.
 fn fill_tables() {
     let clean = Rgb::black(4, 4);
     let key = NoiseKey::new(0, &FrameId(String::new()));

@@ -1,4 +1,4 @@
-//! The dictionary of a capture: [`Replay`], [`to_dict`], [`from_dict`].
+//! Dictionary from which an image can be computed again: [`Replay`], [`to_dict`], [`from_dict`].
 
 use darkqa_ground::types::degradations::Kind;
 use darkqa_light::{CameraState, CaptureState, SensorState, Streak, version};
@@ -10,7 +10,7 @@ use serde_json::{Map, Value, json};
 
 use crate::errors::value_error;
 
-/// Everything that makes an image again from its frame.
+/// Everything needed to compute an image again from its frame.
 pub(crate) struct Replay {
     pub(crate) kind: Kind,
     pub(crate) seed: u64,
@@ -18,7 +18,7 @@ pub(crate) struct Replay {
     pub(crate) capture: CaptureState,
 }
 
-/// The dictionary of a capture: one level of keys, JSON values.
+/// Converts a replay to a flat dictionary of JSON values.
 pub(crate) fn to_dict<'py>(py: Python<'py>, replay: &Replay) -> PyResult<Bound<'py, PyAny>> {
     let Replay {
         kind,
@@ -47,10 +47,10 @@ pub(crate) fn to_dict<'py>(py: Python<'py>, replay: &Replay) -> PyResult<Bound<'
         .call_method1("loads", (fields.to_string(),))
 }
 
-/// The capture of a dictionary.
+/// Parses the dictionary of a replay.
 ///
 /// # Errors
-/// `ValueError` that names the key which is missing, unknown or out of range.
+/// `ValueError` that names a key which is missing, unknown or out of range.
 pub(crate) fn from_dict(state: &Bound<'_, PyDict>) -> PyResult<Replay> {
     let text = state.py().import("json")?.call_method1("dumps", (state,))?;
     let fields: Value = serde_json::from_str(&text.extract::<String>()?)
@@ -58,33 +58,31 @@ pub(crate) fn from_dict(state: &Bound<'_, PyDict>) -> PyResult<Replay> {
     let Value::Object(mut fields) = fields else {
         return Err(PyValueError::new_err("state: a dict expected"));
     };
-    let word: String = taken(&mut fields, "variant")?;
+    let word: String = take(&mut fields, "variant")?;
     let kind = Kind::from_word(&word).ok_or_else(|| {
         let words = Kind::ALL.map(Kind::word).join(", ");
         PyValueError::new_err(format!("state: variant {word:?} is not one of {words}"))
     })?;
-    let made_by: u32 = taken(&mut fields, "version")?;
+    let made_by: u32 = take(&mut fields, "version")?;
     if made_by != version(kind) {
         return Err(PyValueError::new_err(format!(
             "state: version {made_by} is of another synthesis; this module has version {}",
             version(kind)
         )));
     }
-    let (seed, key) = (taken(&mut fields, "seed")?, taken(&mut fields, "key")?);
-    let drop_ev: f64 = taken(&mut fields, "ev")?;
-    let path = (
-        taken(&mut fields, "blur_px")?,
-        taken(&mut fields, "blur_angle")?,
-    );
-    let streak = Streak::new(path.0, path.1).map_err(|problem| value_error(&problem))?;
+    let (seed, key) = (take(&mut fields, "seed")?, take(&mut fields, "key")?);
+    let drop_ev: f64 = take(&mut fields, "ev")?;
+    let length = take(&mut fields, "blur_px")?;
+    let angle = take(&mut fields, "blur_angle")?;
+    let streak = Streak::new(length, angle).map_err(|problem| value_error(&problem))?;
     // L0 has no sensor.
     let is_untouched = drop_ev == 0.0 && fields.is_empty();
     let sensor = if kind.has_noise() && !is_untouched {
         Some(SensorState {
-            amplify: taken(&mut fields, "amplify")?,
-            tone: taken(&mut fields, "tone")?,
-            coupling: taken(&mut fields, "coupling")?,
-            camera: read::<CameraState>(Value::Object(std::mem::take(&mut fields)))?,
+            amplify: take(&mut fields, "amplify")?,
+            tone: take(&mut fields, "tone")?,
+            coupling: take(&mut fields, "coupling")?,
+            camera: parse::<CameraState>(Value::Object(std::mem::take(&mut fields)))?,
         })
     } else {
         None
@@ -108,7 +106,8 @@ pub(crate) fn from_dict(state: &Bound<'_, PyDict>) -> PyResult<Replay> {
     })
 }
 
-fn taken<T: DeserializeOwned>(fields: &mut Map<String, Value>, name: &str) -> PyResult<T> {
+/// Removes a key and parses its value.
+fn take<T: DeserializeOwned>(fields: &mut Map<String, Value>, name: &str) -> PyResult<T> {
     let value = fields
         .remove(name)
         .ok_or_else(|| PyValueError::new_err(format!("state: missing key {name:?}")))?;
@@ -116,7 +115,7 @@ fn taken<T: DeserializeOwned>(fields: &mut Map<String, Value>, name: &str) -> Py
         .map_err(|problem| PyValueError::new_err(format!("state: {name}: {problem}")))
 }
 
-fn read<T: DeserializeOwned>(value: Value) -> PyResult<T> {
+fn parse<T: DeserializeOwned>(value: Value) -> PyResult<T> {
     serde_json::from_value(value)
         .map_err(|problem| PyValueError::new_err(format!("state: {problem}")))
 }

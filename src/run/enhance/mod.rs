@@ -205,7 +205,7 @@ fn enhance_images(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome> {
         InputTally::default(),
     );
     let settings = pixel_settings(&digest, &loading.size);
-    let used_anyway = enhancer.used_anyway();
+    let overruled_problem = enhancer.overruled_problem();
     let mut counts = ImageCounts::default();
     let refusals = Refusals::default();
     for entry in &images.entries {
@@ -214,7 +214,7 @@ fn enhance_images(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome> {
             tally.add(&entry.id, &picture.note());
             let origin = EnhancedOrigin::new(&entry.id, &picture, &settings);
             let place = OutputImage::new(out, &entry.stem, args.force)
-                .with_used_anyway(used_anyway.clone());
+                .with_overruled_problem(overruled_problem.clone());
             place.write_unless_present(&origin, || {
                 let enhanced = enhancer.enhance(&picture.decode()?);
                 enhanced.map_err(|e| Error::data(format_args!("image {:?}", entry.id.0), e))
@@ -244,7 +244,7 @@ fn enhance_images(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome> {
             out.display(),
             counts.written,
             enhancer.name(),
-            if used_anyway.is_some() && counts.written > 0 {
+            if overruled_problem.is_some() && counts.written > 0 {
                 " because of --allow bad-enhancer"
             } else {
                 ""

@@ -1,7 +1,7 @@
-//! Parts of a model's convention, which its graph may not state: [`TensorLayout`], [`Channels`], [`ChannelOrder`],
-//! [`ValueRange`], [`ValueScale`], [`Padding`], [`Tile`], [`Rounding`].
+//! Properties of a model's input and output that its graph may not declare: [`TensorLayout`], [`Channels`], [`ChannelOrder`],
+//! [`ValueRange`], [`ValueScale`], [`Padding`], [`Locality`], [`Rounding`].
 //!
-//! The words are those of the sidecar, `MODEL.onnx.toml`.
+//! Their text forms are the values of keys in the sidecar, `MODEL.onnx.toml`.
 
 use std::fmt;
 use std::str::FromStr;
@@ -27,7 +27,7 @@ pub(crate) enum TensorLayout {
 impl TensorLayout {
     pub(crate) const ALL: [Self; 4] = [Self::Nchw, Self::Nhwc, Self::Chw, Self::Hwc];
 
-    /// Whether each channel is a separate plane.
+    /// True if each channel is a separate plane.
     pub(crate) fn is_planar(self) -> bool {
         matches!(self, Self::Nchw | Self::Chw)
     }
@@ -42,8 +42,8 @@ impl TensorLayout {
         }
     }
 
-    /// Indices of channels, height and width among the dimensions.
-    pub(crate) fn places(self) -> [usize; 3] {
+    /// Indices of the dimensions for channels, height and width.
+    pub(crate) fn axes(self) -> [usize; 3] {
         match self {
             Self::Nchw => [1, 2, 3],
             Self::Nhwc => [3, 1, 2],
@@ -62,14 +62,14 @@ impl TensorLayout {
 
 words!(TensorLayout { Nchw = "NCHW", Nhwc = "NHWC", Chw = "CHW", Hwc = "HWC" });
 
-/// Channels of an image that a model takes and gives.
+/// Channels of a model's input and output image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Channels {
     /// Red, green and blue.
     #[default]
     Rgb,
-    /// The luma alone ([`LUMA`]), 0..1. The image keeps its chroma: the change of its luma is added to each channel.
+    /// Only the luma ([`LUMA`]), 0..1. The enhanced image keeps the chroma: the change of luma is added to each channel.
     Y,
 }
 
@@ -77,15 +77,15 @@ pub(crate) enum Channels {
 pub(crate) const LUMA: [f64; 3] = [0.299, 0.587, 0.114];
 
 impl Channels {
-    /// Their number in words, for messages.
-    pub(crate) fn words(self) -> &'static str {
+    /// Number of channels in words, for messages.
+    pub(crate) fn description(self) -> &'static str {
         match self {
             Self::Rgb => "three channels",
             Self::Y => "one channel (channels = \"y\")",
         }
     }
 
-    /// Number of the channels.
+    /// Number of channels.
     pub(crate) fn count(self) -> usize {
         match self {
             Self::Rgb => 3,
@@ -110,7 +110,7 @@ pub(crate) enum ChannelOrder {
 }
 
 impl ChannelOrder {
-    /// Channel of an RGB image that corresponds to the model's `channel`.
+    /// Index of the RGB channel at index `channel` of the model's order, and vice versa.
     pub(crate) fn rgb_channel(self, channel: usize) -> usize {
         match self {
             Self::Rgb => channel,
@@ -121,7 +121,7 @@ impl ChannelOrder {
 
 words!(ChannelOrder { Rgb = "RGB", Bgr = "BGR" });
 
-/// Values of black and white.
+/// Values of black and white in a tensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) enum ValueRange {
     /// Black 0, white 1.
@@ -138,7 +138,7 @@ pub(crate) enum ValueRange {
 impl ValueRange {
     pub(crate) const ALL: [Self; 3] = [Self::Unit, Self::Bytes, Self::Signed];
 
-    /// Value of a code of 0..255 in this range, divided as the models' own scripts do.
+    /// Maps a code of 0..255 to this range, with the operations that the models' own scripts use.
     pub(crate) fn scale_code(self, code: f32) -> f32 {
         match self {
             Self::Unit => code / 255.0,
@@ -147,8 +147,8 @@ impl ValueRange {
         }
     }
 
-    /// Code of a value in this range, not clamped to 0..255.
-    pub(crate) fn code(self, value: f32) -> f32 {
+    /// Maps a value in this range to a code of 0..255, without clamping.
+    pub(crate) fn to_code(self, value: f32) -> f32 {
         match self {
             Self::Unit => value * 255.0,
             Self::Bytes => value,
@@ -163,10 +163,10 @@ impl fmt::Display for ValueRange {
     }
 }
 
-/// Mean and deviation that networks for other tasks were trained with, on values of 0..1.
+/// Usual normalisation of values in 0..1 by a mean and a standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Normalisation {
-    /// ImageNet's mean and standard deviation, as in `torchvision.models`.
+    /// Mean and standard deviation of ImageNet, as in `torchvision.models`.
     ImageNet,
     /// Mean 0.5, deviation 1: values of −0.5..0.5.
     Centred,
@@ -175,7 +175,7 @@ pub(crate) enum Normalisation {
 }
 
 impl Normalisation {
-    /// Mean and deviation of red, green and blue.
+    /// Means and standard deviations of red, green and blue.
     pub(super) fn mean_and_std(self) -> [[f32; 3]; 2] {
         match self {
             Self::ImageNet => [[0.485, 0.456, 0.406], [0.229, 0.224, 0.225]],
@@ -188,7 +188,7 @@ impl Normalisation {
     }
 }
 
-/// Values of an image in a tensor: a range, or 0..1 with a mean and a deviation.
+/// Scale of the values of an image tensor: a plain range, or 0..1 normalised by a mean and a standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum ValueScale {
     Range(ValueRange),
@@ -205,7 +205,7 @@ impl ValueScale {
         Self::Normalised(Normalisation::Clip),
     ];
 
-    /// The range that a mean and a deviation, if any, are applied to.
+    /// Range of the values before normalisation.
     pub(crate) fn range(self) -> ValueRange {
         match self {
             Self::Range(range) => range,
@@ -213,7 +213,7 @@ impl ValueScale {
         }
     }
 
-    /// Mean and deviation; `None` for a plain range.
+    /// Means and standard deviations; `None` for a plain range.
     pub(crate) fn mean_and_std(self) -> Option<[[f32; 3]; 2]> {
         match self {
             Self::Range(_) => None,
@@ -237,35 +237,34 @@ impl fmt::Display for ValueScale {
     }
 }
 
-/// Pixels that fill an image up to the model's multiple, to the right and below.
+/// Content of the pixels added at the right and bottom to reach the model's multiple.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Padding {
-    /// The image, mirrored at its last pixel.
+    /// The image mirrored at its last pixel, which is not repeated.
     #[default]
     Reflect,
     /// Black, code 0 in each channel.
     Zero,
     /// The last pixel, repeated.
     Replicate,
-    /// No padding: the model gets the largest part that fits. The rest comes from another run on a part that ends at the
-    /// image's edge.
+    /// No padding: the model runs on overlapping parts whose sides are multiples, the last of which end at the image's edges.
     Crop,
 }
 
 impl Padding {
-    /// Index of the pixel that is copied to position `at`, which may be beyond the end of the side; `None` for black.
-    pub(crate) fn source(self, at: usize, side: usize) -> Option<usize> {
-        if at < side {
-            return Some(at);
+    /// Index of the pixel copied to `position`, which may be beyond the end of a side of `side` pixels; `None` for black.
+    pub(crate) fn source(self, position: usize, side: usize) -> Option<usize> {
+        if position < side {
+            return Some(position);
         }
         match self {
             Self::Zero => None,
             Self::Replicate | Self::Crop => Some(side - 1),
             Self::Reflect => {
-                // Mirrored at the last pixel, and again at the first if the padding is larger than the image.
+                // The pattern repeats, because padding larger than the image is mirrored again at the first pixel.
                 let period = (2 * (side - 1)).max(1);
-                let within = at % period;
+                let within = position % period;
                 Some(within.min(period - within).min(side - 1))
             }
         }
@@ -278,7 +277,7 @@ impl fmt::Display for Padding {
     }
 }
 
-/// Conversion of a value between two codes to a code.
+/// Rounding of a value between two 8-bit codes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Rounding {
@@ -295,31 +294,31 @@ impl fmt::Display for Rounding {
     }
 }
 
-/// How far a pixel of the result depends on the image around it.
+/// Neighbourhood in the input on which a pixel of the output depends (key `tile`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Tile {
-    /// It depends on the whole image.
-    None,
-    /// It depends on the given number of pixels on each side, so that tiles with that context are exact.
+pub(crate) enum Locality {
+    /// The whole image, so that the image cannot be tiled.
+    Global,
+    /// This number of pixels on each side, so that tiles with that context are exact.
     Exact(usize),
 }
 
-impl fmt::Display for Tile {
+impl fmt::Display for Locality {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::None => f.write_str("none"),
+            Self::Global => f.write_str("none"),
             Self::Exact(context) => write!(f, "exact:{context}"),
         }
     }
 }
 
-impl FromStr for Tile {
+impl FromStr for Locality {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
         let context = text.strip_prefix("exact:").map(str::parse);
         match (text, context) {
-            ("none", _) => Ok(Self::None),
+            ("none", _) => Ok(Self::Global),
             (_, Some(Ok(context))) if context <= 4096 => Ok(Self::Exact(context)),
             _ => Err(format!(
                 "tile is {text:?}; expected \"none\", or \"exact:N\" with N pixels of context, at most 4096"
@@ -328,7 +327,7 @@ impl FromStr for Tile {
     }
 }
 
-as_text!(Tile);
+as_text!(Locality);
 
 /// Type of a tensor's elements.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -346,17 +345,17 @@ pub(crate) enum ElementType {
     Bfloat16,
     Float32,
     Float64,
-    /// Any other type, by its name; not supported.
+    /// An unsupported type, by its name.
     Other(String),
 }
 
 impl ElementType {
-    /// Value range that the type states: bytes are 0..255.
-    pub(crate) fn certain_range(&self) -> Option<ValueRange> {
+    /// Value range that the type implies: 0..255 for bytes.
+    pub(crate) fn implied_range(&self) -> Option<ValueRange> {
         (*self == Self::Uint8).then_some(ValueRange::Bytes)
     }
 
-    /// Value range that images of this type usually have.
+    /// Usual value range of images of this type.
     pub(crate) fn usual_range(&self) -> ValueRange {
         match self {
             Self::Uint8 | Self::Int32 | Self::Int64 => ValueRange::Bytes,
@@ -364,14 +363,14 @@ impl ElementType {
         }
     }
 
-    /// Whether images of this type can be fed.
-    pub(super) fn is_fed(&self) -> bool {
+    /// True if image inputs of this type are supported.
+    pub(super) fn is_input_type(&self) -> bool {
         matches!(self, Self::Float32 | Self::Float16 | Self::Uint8)
     }
 
-    /// Whether images of this type can be read.
-    pub(crate) fn is_read(&self) -> bool {
-        self.is_fed() || matches!(self, Self::Float64 | Self::Int32 | Self::Int64)
+    /// True if image outputs of this type are supported.
+    pub(crate) fn is_output_type(&self) -> bool {
+        self.is_input_type() || matches!(self, Self::Float64 | Self::Int32 | Self::Int64)
     }
 }
 

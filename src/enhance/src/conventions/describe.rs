@@ -3,35 +3,35 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use super::convention::Tile;
+use super::convention::Locality;
 use super::preset::Preset;
 use super::sidecar::ModelSidecar;
 use crate::graphs::Graph;
 use crate::sizing::{MULTIPLES, SizeRule};
 use darkqa_ground::types::manifests::{ConventionLine, TRAINED_ON};
 
-/// Source of ranges that nothing states.
+/// Source of value ranges that neither sidecar, preset nor element type states.
 const ASSUMED: &str = "assumed";
 
-/// Source of values that the graph itself states.
+/// Source of values that the graph declares.
 const GRAPH: &str = "graph";
 
-/// Sources of a model's convention, and its number of flushed weights.
+/// Sources of a model's convention, with caveats and the number of flushed weights.
 #[derive(Debug)]
 pub(crate) struct Description {
-    /// The user's sidecar; empty if there is none.
+    /// The user's sidecar; empty without a file.
     pub(crate) sidecar: ModelSidecar,
     /// The preset, if one was named.
     pub(crate) preset: Option<Preset>,
-    /// Whether nothing states the ranges and the usual ones, which are plausible, are assumed.
-    pub(crate) assumed: bool,
+    /// True if the usual value ranges are assumed, because they are not stated and the probe's images are plausible with them.
+    pub(crate) has_assumed_ranges: bool,
     /// Caveats for readers of the results, as sentences that follow the model's name.
     pub(crate) remarks: Vec<String>,
     /// Number of subnormal weights that were set to zero.
     pub(crate) flushed: usize,
 }
 
-/// Rows of a table: name, value, source.
+/// Rows of a table with the columns name, value and source.
 struct Lines(Vec<ConventionLine>);
 
 impl Lines {
@@ -45,7 +45,7 @@ impl Lines {
 }
 
 impl Description {
-    /// How the model is fed and read.
+    /// Rows of the table of the model's input and output convention.
     pub(crate) fn lines(&self, graph: &Graph, convention: &ModelSidecar) -> Vec<ConventionLine> {
         let mut lines = Lines(Vec::new());
         if let Some(preset) = &self.preset {
@@ -54,8 +54,8 @@ impl Description {
         for remark in &self.remarks {
             lines.add("remark", remark, GRAPH);
         }
-        if let Some(differing) = &graph.differing {
-            lines.add("warning", differing, "graph");
+        if let Some(differences) = &graph.preset_differences {
+            lines.add("warning", differences, "graph");
         }
         self.input(&mut lines, graph, convention);
         self.output(&mut lines, graph);
@@ -63,7 +63,7 @@ impl Description {
             Some(_) => self.source(|s| s.tile.is_some(), ""),
             None => "not set; --llie-options tile=N tries tiles and checks every seam".to_owned(),
         };
-        lines.add("tile", convention.tile.unwrap_or(Tile::None), source);
+        lines.add("tile", convention.tile.unwrap_or(Locality::Global), source);
         if let Some(data) = &convention.trained_on {
             let source = self.source(|s| s.trained_on.is_some(), "");
             lines.add(TRAINED_ON, data, source);
@@ -71,7 +71,7 @@ impl Description {
         lines.0
     }
 
-    /// The table as text.
+    /// The table as text, with additional rows about weights and ONNX Runtime.
     pub(crate) fn text(&self, path: &Path, graph: &Graph, convention: &ModelSidecar) -> String {
         let mut lines = Lines(self.lines(graph, convention));
         lines.add(
@@ -82,18 +82,18 @@ impl Description {
         let runtime = graph.runtime();
         let source = format!("{}: {}", runtime.place(), runtime.path().display());
         lines.add("ONNX Runtime", runtime.version(), source);
-        aligned(path, &lines.0)
+        align(path, &lines.0)
     }
 
     /// Adds the lines about the input.
     fn input(&self, lines: &mut Lines, graph: &Graph, convention: &ModelSidecar) {
-        let (signature, feeding) = (&graph.signature, &graph.feeding);
-        let side = |size: Option<usize>| size.map_or("any".to_owned(), |size| size.to_string());
+        let (signature, encoding) = (&graph.signature, &graph.encoding);
         lines.add("input", &signature.input.port, GRAPH);
         let source = self.source(|s| s.layout_in.is_some(), "graph: the dimension of size 3");
-        lines.add("layout_in", feeding.layout, source);
-        let height_width = format!("{} × {}", side(signature.height), side(signature.width));
-        lines.add("height × width", height_width, GRAPH);
+        lines.add("layout_in", encoding.layout, source);
+        let [height, width] = [signature.height, signature.width]
+            .map(|side| side.map_or("any".to_owned(), |side| side.to_string()));
+        lines.add("height × width", format!("{height} × {width}"), GRAPH);
         if let Some([width, height]) = convention.fixed {
             let source = self.source(|s| s.fixed.is_some(), "");
             lines.add("fixed", format!("{height} × {width}"), source);
@@ -115,14 +115,14 @@ impl Description {
             lines.add("channels", channels, source);
         }
         let source = self.source(|s| s.color.is_some(), "default, cannot be checked");
-        lines.add("color", feeding.color, source);
+        lines.add("color", encoding.color, source);
         let source = self.source(
             |s| s.range_in.is_some(),
             self.range_source("default for its type"),
         );
-        lines.add("range_in", feeding.range, source);
+        lines.add("range_in", encoding.range, source);
         if convention.mean.is_some() || convention.std.is_some() {
-            let value = format!("{:?}, {:?}", feeding.mean, feeding.std);
+            let value = format!("{:?}, {:?}", encoding.mean, encoding.std);
             let source = self.source(|s| s.mean.is_some() || s.std.is_some(), default);
             lines.add("mean, std", value, source);
         }
@@ -135,7 +135,7 @@ impl Description {
                     self.source(|s| s.multiple.is_some(), ""),
                 );
             }
-            None if SizeRule::new(fixed, convention, feeding.pad).takes_any_size() => {
+            None if SizeRule::new(fixed, convention, encoding.pad).takes_any_size() => {
                 let others = MULTIPLES[1..]
                     .iter()
                     .map(ToString::to_string)
@@ -152,7 +152,7 @@ impl Description {
         }
         lines.add(
             "pad",
-            feeding.pad,
+            encoding.pad,
             self.source(|s| s.pad.is_some(), "default"),
         );
         if convention.pad_always == Some(true) {
@@ -167,15 +167,16 @@ impl Description {
 
     /// Adds the lines about the output.
     fn output(&self, lines: &mut Lines, graph: &Graph) {
-        let (outputs, composition) = (&graph.signature.outputs, &graph.reading);
+        let (outputs, composition) = (&graph.signature.outputs, &graph.decoding);
         if let Some(image) = &graph.convention.image {
-            let preset = self.preset.as_ref();
-            let preset =
-                preset.map_or(GRAPH.to_owned(), |preset| format!("preset {}", preset.name));
-            let source = self.source(|s| s.image.is_some(), &preset);
+            let fallback = self
+                .preset
+                .as_ref()
+                .map_or(GRAPH.to_owned(), |preset| format!("preset {}", preset.name));
+            let source = self.source(|s| s.image.is_some(), &fallback);
             lines.add("image = ", image, source);
         }
-        for (output, reading) in outputs.iter().zip(&composition.outputs) {
+        for (output, decoding) in outputs.iter().zip(&composition.outputs) {
             let source = match (output.reason, &self.preset) {
                 ("stated", Some(preset)) => {
                     self.source(|s| s.output.is_some(), &format!("preset {}", preset.name))
@@ -184,24 +185,24 @@ impl Description {
                 (reason, _) => reason.to_owned(),
             };
             lines.add("output", &output.port, source);
-            let fallback = match reading.layout {
+            let fallback = match decoding.layout {
                 Some(_) => "graph: the dimension of size 3",
                 None => "like the input; the actual output decides",
             };
             let source = self.source(|s| s.layout_out.is_some(), fallback);
-            let layout = reading.layout.unwrap_or(reading.preferred);
+            let layout = decoding.layout.unwrap_or(decoding.preferred);
             lines.add("layout_out", layout, source);
         }
         for port in &graph.signature.unread {
             lines.add("not read", port, GRAPH);
         }
-        let reading = &composition.outputs[0];
+        let decoding = &composition.outputs[0];
         let source = self.source(|s| s.color_out.is_some(), "like the input");
-        lines.add("color_out", reading.color, source);
+        lines.add("color_out", decoding.color, source);
         let checked = "like the input; the actual output is checked";
         let source = self.source(|s| s.range_out.is_some(), self.range_source(checked));
-        lines.add("range_out", reading.range, source);
-        if let Some([mean, std]) = reading.mean_and_std {
+        lines.add("range_out", decoding.range, source);
+        if let Some([mean, std]) = decoding.mean_and_std {
             let source = self.source(|s| s.mean_out.is_some() || s.std_out.is_some(), "default");
             lines.add("mean_out, std_out", format!("{mean:?}, {std:?}"), source);
         }
@@ -209,12 +210,16 @@ impl Description {
         lines.add("rounding", composition.rounding, source);
     }
 
-    /// Source of a range that nothing states.
+    /// Source of an unstated value range: `otherwise`, unless ranges were assumed after the probe.
     fn range_source(&self, otherwise: &'static str) -> &'static str {
-        if self.assumed { ASSUMED } else { otherwise }
+        if self.has_assumed_ranges {
+            ASSUMED
+        } else {
+            otherwise
+        }
     }
 
-    /// Source of a value: sidecar or preset if they state it, else `otherwise`.
+    /// Source of a value: the sidecar or the preset if `states` holds for it, else `otherwise`.
     fn source(&self, states: impl Fn(&ModelSidecar) -> bool, otherwise: &str) -> String {
         match &self.preset {
             _ if states(&self.sidecar) => "sidecar".to_owned(),
@@ -224,20 +229,15 @@ impl Description {
     }
 }
 
-/// Longest value, in characters, that the other rows of a table are padded to; remarks are longer. Chosen.
+/// Widest cell, in characters, that sets the width of its column; longer remarks do not. Chosen.
 const MAX_PADDED: usize = 60;
 
-/// A table of lines as text, with columns of equal width.
-fn aligned(path: &Path, lines: &[ConventionLine]) -> String {
-    let width = |cell: fn(&ConventionLine) -> &str| {
-        lines
-            .iter()
-            .map(|line| cell(line).chars().count())
-            .filter(|width| *width <= MAX_PADDED)
-            .max()
-            .unwrap_or(0)
-    };
-    let widths = [width(|line| &line.key), width(|line| &line.value)];
+/// Table as text, with aligned columns and the model's path as its title.
+fn align(path: &Path, lines: &[ConventionLine]) -> String {
+    let widths = [
+        column_width(lines.iter().map(|line| line.key.as_str())),
+        column_width(lines.iter().map(|line| line.value.as_str())),
+    ];
     let mut text = format!("{}\n", path.display());
     for ConventionLine { key, value, source } in lines {
         // Writing to a string cannot fail.
@@ -248,4 +248,13 @@ fn aligned(path: &Path, lines: &[ConventionLine]) -> String {
         );
     }
     text
+}
+
+/// Width of the widest cell of at most [`MAX_PADDED`] characters.
+fn column_width<'a>(cells: impl Iterator<Item = &'a str>) -> usize {
+    cells
+        .map(|cell| cell.chars().count())
+        .filter(|width| *width <= MAX_PADDED)
+        .max()
+        .unwrap_or(0)
 }

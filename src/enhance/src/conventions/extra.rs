@@ -1,4 +1,4 @@
-//! Values of further inputs, as `[extra]` of a sidecar states them: [`ExtraValue`].
+//! Values of further inputs, from the table `[extra]` of a sidecar: [`ExtraValue`].
 
 use std::fmt;
 
@@ -8,8 +8,8 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::expressions::Expression;
 
-/// Most numbers of a list; chosen.
-const MOST_NUMBERS: usize = 4096;
+/// Maximum length of a list of numbers; chosen.
+const MAX_NUMBERS: usize = 4096;
 
 /// Value of a further input.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,7 +18,7 @@ pub(crate) enum ExtraValue {
     Number(Number),
     /// A vector: `alpha = [1, 2, 3]`.
     List(Vec<Number>),
-    /// A tensor of the image's size in which each sample is this number: `ratio = { map = 5.0 }`.
+    /// A tensor of the image's size, filled with this number: `ratio = { map = 5.0 }`.
     Map(Number),
     /// Normal noise: `z = { noise = "normal", std = 0.9, seed = 0, divide = 8 }`.
     Noise(NoiseStatement),
@@ -26,7 +26,7 @@ pub(crate) enum ExtraValue {
     From(Expression),
 }
 
-/// A number or a truth value, as the sidecar writes it.
+/// A number or boolean of the sidecar.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Number {
     Bool(bool),
@@ -44,18 +44,18 @@ impl fmt::Display for Number {
     }
 }
 
-/// Noise that a further input is given.
+/// Parameters of the noise for a further input.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct NoiseStatement {
     /// Standard deviation.
     pub(crate) std: f64,
-    /// Seed; another one gives other noise.
+    /// Seed of the noise.
     pub(crate) seed: u64,
-    /// Height and width are those of the image, divided by this number and rounded up.
+    /// Divisor of the image's height and width, which are rounded up.
     pub(crate) divide: usize,
 }
 
-/// The table of a value that is no plain number.
+/// TOML table that states a map, noise or an expression.
 #[derive(Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Table {
@@ -78,10 +78,10 @@ impl TryFrom<Table> for ExtraValue {
     type Error = String;
 
     fn try_from(table: Table) -> Result<Self, String> {
-        let noise_alone = table.std.is_none() && table.seed.is_none() && table.divide.is_none();
+        let has_noise_keys = table.std.is_some() || table.seed.is_some() || table.divide.is_some();
         match (table.map, table.noise, table.from) {
-            (Some(map), None, None) if noise_alone => Ok(Self::Map(map)),
-            (None, None, Some(from)) if noise_alone => Ok(Self::From(from)),
+            (Some(map), None, None) if !has_noise_keys => Ok(Self::Map(map)),
+            (None, None, Some(from)) if !has_noise_keys => Ok(Self::From(from)),
             (None, Some(Distribution::Normal), None) => {
                 let std = table.std.unwrap_or(1.0);
                 let divide = table.divide.unwrap_or(1);
@@ -101,11 +101,11 @@ impl TryFrom<Table> for ExtraValue {
     }
 }
 
-/// The forms of a table, for messages.
+/// Accepted forms of a table, for messages.
 const FORMS: &str = "`{ map = NUMBER }`, `{ noise = \"normal\", std = NUMBER, seed = NUMBER, divide = NUMBER }` or `{ from = \"EXPRESSION\" }`";
 
 impl Serialize for Number {
-    /// A whole number is written as a float where that is the same number: `1` and `1.0` are one statement.
+    /// Writes an integer as a float if that is exact, so that `1` and `1.0` give the same digest.
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self {
             Self::Bool(value) => serializer.serialize_bool(*value),
@@ -145,10 +145,10 @@ impl Serialize for ExtraValue {
     }
 }
 
-/// Visitor of a number or of a table.
-struct AnyValue;
+/// Visitor of every form of an [`ExtraValue`].
+struct ExtraValueVisitor;
 
-impl<'de> Visitor<'de> for AnyValue {
+impl<'de> Visitor<'de> for ExtraValueVisitor {
     type Value = ExtraValue;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -171,9 +171,9 @@ impl<'de> Visitor<'de> for AnyValue {
         let mut numbers = Vec::new();
         while let Some(number) = list.next_element()? {
             numbers.push(number);
-            if numbers.len() > MOST_NUMBERS {
+            if numbers.len() > MAX_NUMBERS {
                 return Err(A::Error::custom(format!(
-                    "a list can have at most {MOST_NUMBERS} numbers"
+                    "a list can have at most {MAX_NUMBERS} numbers"
                 )));
             }
         }
@@ -188,7 +188,7 @@ impl<'de> Visitor<'de> for AnyValue {
 
 impl<'de> Deserialize<'de> for ExtraValue {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(AnyValue)
+        deserializer.deserialize_any(ExtraValueVisitor)
     }
 }
 
@@ -202,10 +202,10 @@ impl<'de> Deserialize<'de> for Number {
 }
 
 impl ExtraValue {
-    /// Checks everything that needs no graph: numbers are finite, and the names of an expression are known.
+    /// Checks, without a graph, that numbers are finite and that an expression uses only known names.
     ///
     /// # Errors
-    /// A description of the faulty value of `name`.
+    /// A message about the faulty value of the key `name`.
     pub(super) fn check(&self, name: &str) -> Result<(), String> {
         match self {
             Self::Number(Number::Float(value)) | Self::Map(Number::Float(value))
@@ -214,12 +214,15 @@ impl ExtraValue {
                 Err(format!("extra.{name} is {value}; expected a finite number"))
             }
             Self::List(numbers) => {
-                let wrong = numbers
+                match numbers
                     .iter()
-                    .find(|n| matches!(n, Number::Float(value) if !value.is_finite()));
-                wrong.map_or(Ok(()), |value| {
-                    Err(format!("extra.{name} has {value}; expected finite numbers"))
-                })
+                    .find(|n| matches!(n, Number::Float(value) if !value.is_finite()))
+                {
+                    None => Ok(()),
+                    Some(value) => {
+                        Err(format!("extra.{name} has {value}; expected finite numbers"))
+                    }
+                }
             }
             Self::From(expression) => {
                 expression.check_names(&format!("extra.{name}.from"), &["image"])
@@ -252,7 +255,8 @@ mod tests {
 
     use super::*;
 
-    fn read(text: &str) -> Result<ExtraValue, String> {
+    /// Parses and checks the value of a key `a`.
+    fn parse(text: &str) -> Result<ExtraValue, String> {
         let mut all: BTreeMap<String, ExtraValue> =
             toml::from_str(&format!("a = {text}")).map_err(|e| e.message().to_owned())?;
         let value = all.remove("a").unwrap();
@@ -260,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn every_form_is_read() {
+    fn every_form_is_parsed() {
         let rows = [
             ("3", ExtraValue::Number(Number::Integer(3))),
             ("0.8", ExtraValue::Number(Number::Float(0.8))),
@@ -292,12 +296,12 @@ mod tests {
             ),
         ];
         for (text, value) in rows {
-            assert_eq!(read(text), Ok(value), "{text}");
+            assert_eq!(parse(text), Ok(value), "{text}");
         }
     }
 
     #[test]
-    fn a_wrong_form_is_an_error_that_says_what_is_expected() {
+    fn error_about_a_wrong_form_names_the_accepted_forms() {
         for (text, part) in [
             ("\"3\"", "a number, true, false"),
             ("{ }", "{ map = NUMBER }"),
@@ -317,22 +321,21 @@ mod tests {
             ("nan", "extra.a is NaN"),
             ("{ map = inf }", "extra.a is inf"),
         ] {
-            let message = read(text).unwrap_err();
+            let message = parse(text).unwrap_err();
             assert!(message.contains(part), "{text}: {message}");
         }
     }
 
     #[test]
-    fn a_number_is_written_as_before() {
-        let text = |value: &str| serde_json::to_string(&read(value).unwrap()).unwrap();
-        for (value, written) in [
+    fn integers_are_serialized_as_floats_where_that_is_exact() {
+        for (value, json) in [
             ("1", "1.0"),
             ("0.8", "0.8"),
             ("1e-7", "1e-7"),
             ("true", "true"),
+            ("9007199254740993", "9007199254740993"),
         ] {
-            assert_eq!(text(value), written);
+            assert_eq!(serde_json::to_string(&parse(value).unwrap()).unwrap(), json);
         }
-        assert_eq!(text("9007199254740993"), "9007199254740993");
     }
 }

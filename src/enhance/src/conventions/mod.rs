@@ -1,4 +1,4 @@
-//! Conventions of models: statements of sidecars, presets and graphs, and their description.
+//! Input and output conventions of models, from sidecars, presets and graphs.
 
 mod convention;
 mod describe;
@@ -10,8 +10,8 @@ mod signature;
 #[cfg(test)]
 pub(super) use convention::Normalisation;
 pub(super) use convention::{
-    ChannelOrder, Channels, ElementType, LUMA, Padding, Rounding, TensorLayout, Tile, ValueRange,
-    ValueScale,
+    ChannelOrder, Channels, ElementType, LUMA, Locality, Padding, Rounding, TensorLayout,
+    ValueRange, ValueScale,
 };
 pub(super) use describe::Description;
 pub(super) use extra::{ExtraValue, NoiseStatement, Number};

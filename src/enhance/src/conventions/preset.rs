@@ -1,4 +1,4 @@
-//! Conventions of published models, as their authors' code has them: [`Preset`].
+//! Conventions of published models, taken from their authors' code: [`Preset`].
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -9,72 +9,72 @@ use serde::{Deserialize, Serialize};
 use super::extra::{ExtraValue, Number};
 use super::sidecar::{ADD, ModelSidecar, OutputChoice};
 use crate::expressions::Expression;
-use crate::graphs::{Port, list};
+use crate::graphs::{Port, format_ports};
 use darkqa_ground::error::{Error, Result};
 use darkqa_ground::types::text::near_name::suggestion;
 
 /// TOML file of all presets.
 const PRESETS: &str = include_str!("../presets.toml");
 
-/// Length of a preset's name up to which it must be a word of a file's name; chosen.
-const SHORT: usize = 4;
+/// Maximum length of a preset name that counts only as a whole word of a file name, such as `sci`; chosen.
+const MAX_SHORT_NAME: usize = 4;
 
 /// Convention of a published model.
 #[derive(Debug)]
 pub(crate) struct Preset {
-    /// Name as the user gave it, as `zero-dce`.
+    /// Name as the user wrote it, such as `zero-dce`.
     pub(crate) name: String,
-    /// Source, outputs, and statements in the form of a sidecar.
+    /// Source, outputs and convention.
     pub(crate) content: PresetContent,
 }
 
-/// Entry of the file of presets.
+/// Entry of `presets.toml`.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct PresetContent {
     /// Repository on GitHub.
     repository: String,
-    /// Commit of the repository that was read.
+    /// Commit from which the convention was taken.
     commit: String,
-    /// Files in it that were read.
+    /// Files of the repository that define the convention.
     file: String,
-    /// Authors, place and year, and a remark.
+    /// Authors, venue and year, and a remark.
     paper: String,
     /// Licence of code and weights.
     licence: String,
     /// Path of the official weights in the repository; `None` if they are linked from its README.
     weights: Option<String>,
-    /// Size of an example, if the export needs one.
+    /// Example size for models that can be exported for one size only.
     one_size: Option<String>,
-    /// Source of the file, if the project's script does not export it.
+    /// Source of a ready-made ONNX file, for models that `models/export.py` does not export.
     ready_made: Option<String>,
-    /// Names of the output that is the image, the first one first.
+    /// Possible names of the image output, in order of preference.
     names: Vec<String>,
-    /// All outputs of the repository's own export, by name; the first is the image.
+    /// Names of all outputs of the repository's own export; the first is the image.
     #[serde(default)]
     own_export: Vec<String>,
-    /// Lists of outputs whose image is known by its place.
+    /// Lists of outputs in which the image is identified by its position.
     #[serde(default)]
     signatures: Vec<OutputList>,
     /// The image as an expression of outputs.
     image: Option<Expression>,
-    /// The image in a single output of more channels than it has.
+    /// The image within a single output that has more channels than an image.
     stacked: Option<StackedOutput>,
-    /// All else.
+    /// The rest of the convention.
     pub(crate) sidecar: ModelSidecar,
 }
 
-/// A list of outputs, and which of them is the image.
+/// List of a model's outputs, with the position of the image.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct OutputList {
     /// Channels of each output, in order.
     channels: Vec<usize>,
-    /// Place of the image, from 1.
+    /// Position of the image, from 1.
     nth: usize,
 }
 
-/// The image in a single output of several things, one behind the other.
+/// The image within a single output that stacks several results along its channels.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct StackedOutput {
@@ -85,16 +85,16 @@ struct StackedOutput {
 }
 
 impl StackedOutput {
-    /// The image as an expression of the output of a graph; `None` if the graph has other outputs.
-    fn image_of(&self, outputs: &[Port]) -> Option<Expression> {
+    /// The image as an expression of the graph's output; `None` if the graph has other outputs than the preset.
+    fn image_expression(&self, outputs: &[Port]) -> Option<Expression> {
         let [port] = outputs else { return None };
-        let named = || self.image.replace("x[", &format!("`{}`[", port.name));
         port.layout(self.channels)?;
-        named().parse().ok()
+        let text = self.image.replace("x[", &format!("`{}`[", port.name));
+        text.parse().ok()
     }
 }
 
-/// The preset's rules that choose an output, in addition to the sidecar's keys; part of an enhancer's digest.
+/// Rules of a preset for choosing the image output, in addition to the sidecar's keys; part of an enhancer's digest.
 #[derive(Serialize)]
 pub(crate) struct PresetOutputs<'a> {
     names: &'a [String],
@@ -106,35 +106,34 @@ pub(crate) struct PresetOutputs<'a> {
     stacked: Option<&'a StackedOutput>,
 }
 
-/// All presets by their names.
-fn all() -> Result<BTreeMap<String, PresetContent>> {
+/// All presets by name.
+fn all_presets() -> Result<BTreeMap<String, PresetContent>> {
     toml::from_str(PRESETS).map_err(|e| Error::data("presets.toml", e))
 }
 
-/// Number that a preset gives an input of this name, and the preset's name.
-pub(crate) fn number_of(input: &str) -> Option<(Number, String)> {
-    all()
-        .ok()?
-        .into_iter()
-        .find_map(|(name, content)| match content.sidecar.extra.get(input)? {
+/// Value that a preset states for an input of this name, with the preset's name.
+pub(crate) fn known_number(input: &str) -> Option<(Number, String)> {
+    all_presets().ok()?.into_iter().find_map(|(name, content)| {
+        match content.sidecar.extra.get(input)? {
             ExtraValue::Number(number) | ExtraValue::Map(number) => Some((*number, name)),
             ExtraValue::List(_) | ExtraValue::Noise(_) | ExtraValue::From(_) => None,
-        })
+        }
+    })
 }
 
-/// Names of the presets that know a list of outputs by its channels.
-pub(crate) fn that_know(outputs: &[Port]) -> Vec<String> {
-    all()
+/// Names of the presets that list outputs with these numbers of channels.
+pub(crate) fn with_outputs(outputs: &[Port]) -> Vec<String> {
+    all_presets()
         .unwrap_or_default()
         .into_iter()
-        .filter(|(_, content)| content.by_channels(outputs).is_some())
+        .filter(|(_, content)| content.index_by_channels(outputs).is_some())
         .map(|(name, _)| name)
         .collect()
 }
 
 impl PresetContent {
-    /// Index of the image, by the channels of all outputs.
-    fn by_channels(&self, outputs: &[Port]) -> Option<usize> {
+    /// Index of the image output, identified by the numbers of channels of all outputs.
+    fn index_by_channels(&self, outputs: &[Port]) -> Option<usize> {
         let channels: Vec<Option<usize>> = outputs.iter().map(Port::channels).collect();
         let list = self.signatures.iter().find(|list| {
             list.channels.len() == channels.len()
@@ -147,22 +146,21 @@ impl PresetContent {
         list.nth.checked_sub(1)
     }
 
-    /// The image, by the names of the outputs. The name of a first output counts only if the others were named too: see
+    /// Index of the image output, identified by name. The name of the first output counts only if the others were named too; see
     /// [`Port::is_numbered`].
-    fn by_name(&self, outputs: &[Port]) -> Option<usize> {
+    fn index_by_name(&self, outputs: &[Port]) -> Option<usize> {
         if outputs.iter().map(|port| &port.name).eq(&self.own_export) {
             return Some(0);
         }
-        let place = |name: &String| outputs.iter().position(|port| port.name == *name);
-        let numbered = outputs.iter().any(Port::is_numbered);
+        let has_numbered = outputs.iter().any(Port::is_numbered);
         self.names
             .iter()
-            .filter_map(place)
-            .find(|place| *place > 0 || !numbered)
+            .filter_map(|name| outputs.iter().position(|port| port.name == *name))
+            .find(|index| *index > 0 || !has_numbered)
     }
 
-    /// Whether the outputs have all names of the expression of the image.
-    fn image_of(&self, outputs: &[Port]) -> Option<&Expression> {
+    /// The preset's expression of the image; `None` if the graph lacks an output that it names.
+    fn image_expression(&self, outputs: &[Port]) -> Option<&Expression> {
         self.image.as_ref().filter(|image| {
             image
                 .names()
@@ -173,7 +171,7 @@ impl PresetContent {
 }
 
 impl PresetContent {
-    /// The lines of a preset in the list of all.
+    /// Lines about this preset in the list of presets.
     fn entry(&self, name: &str) -> String {
         let folder = self
             .repository
@@ -185,8 +183,10 @@ impl PresetContent {
             Some(path) => format!("{folder}/{path}"),
             None => "WEIGHTS".to_owned(),
         };
-        let size = self.one_size.as_ref();
-        let size = size.map_or_else(String::new, |size| format!(" --size {size}"));
+        let size = self
+            .one_size
+            .as_ref()
+            .map_or_else(String::new, |size| format!(" --size {size}"));
         let export = match &self.ready_made {
             Some(source) => format!("  file: {source}\n"),
             None => format!(
@@ -205,7 +205,7 @@ impl PresetContent {
         )
     }
 
-    /// How the authors' model is fed and read: the lines of a sidecar, with the usual ranges where the preset states none.
+    /// Convention of the authors' model as lines of a sidecar, with defaults for missing value ranges and rounding.
     fn conventions(&self) -> String {
         let image = self
             .image
@@ -216,14 +216,13 @@ impl PresetContent {
             Some(image) => format!("image = {image:?}"),
             None => format!("output {}", self.names.join(" or ")),
         };
-        let usual = [
+        let mut keys: BTreeMap<String, toml::Value> = [
             ("range_in", "0..1"),
             ("range_out", "0..1"),
             ("rounding", "round"),
-        ];
-        let mut keys: BTreeMap<String, toml::Value> = usual
-            .map(|(key, value)| (key.to_owned(), toml::Value::from(value)))
-            .into();
+        ]
+        .map(|(key, value)| (key.to_owned(), toml::Value::from(value)))
+        .into();
         if let Ok(toml::Value::Table(stated)) = toml::Value::try_from(&self.sidecar) {
             keys.extend(stated);
         }
@@ -235,12 +234,12 @@ impl PresetContent {
     }
 }
 
-/// The list of all presets, with source, licence, conventions and export of each.
+/// List of all presets as text, each with source, licence, convention and export command.
 ///
 /// # Errors
-/// If the file of presets is broken, which is a bug.
+/// If `presets.toml` is invalid, which is a bug.
 pub fn list_of_presets() -> Result<String> {
-    let entries = all()?;
+    let entries = all_presets()?;
     Ok(entries
         .iter()
         .map(|(name, content)| content.entry(name))
@@ -261,21 +260,21 @@ impl fmt::Display for PresetContent {
 }
 
 impl Preset {
-    /// Splits `zero-dce:FILE` into preset and file; there is no preset if `model` is only a file.
+    /// Splits `zero-dce:FILE` into preset and file. The preset is `None` if `model` is only a file.
     ///
     /// # Errors
-    /// If the word before the colon is not a preset, and the whole is not a file.
+    /// If the name before the colon is not a preset, and no file has the whole argument as its name.
     pub(crate) fn split(model: &Path) -> Result<(Option<Self>, PathBuf)> {
         let text = model.to_string_lossy();
         let Some((name, file)) = text.split_once(':').filter(|_| !model.exists()) else {
             return Ok((None, model.to_owned()));
         };
-        // The colon belongs to a drive of Windows, or to a path.
+        // The colon belongs to a Windows drive or to a path.
         if name.len() < 2 || name.contains(['/', '\\', '.']) {
             return Ok((None, model.to_owned()));
         }
-        let mut all = all()?;
-        // The shell needs no quotes for zero-dce-pp.
+        let mut all = all_presets()?;
+        // `zero-dce-pp` is an alias of `zero-dce++`.
         let known = name.replace("-pp", "++");
         let Some(content) = all.remove(&known) else {
             let names: Vec<String> = all.into_keys().collect();
@@ -290,35 +289,20 @@ impl Preset {
         Ok((Some(Self { name, content }), PathBuf::from(file)))
     }
 
-    /// The preset that a file is named after, if it is not this one or a sibling of it, as `ruas-upe` of `ruas-lol`.
-    pub(crate) fn named_after(&self, file: &Path) -> Option<String> {
-        let letters = |text: &str| {
-            text.to_lowercase()
-                .replace(|c: char| !c.is_alphanumeric(), "")
-        };
+    /// Another preset whose name occurs in the file name; `None` if this preset's family occurs in it, such as `ruas` of `ruas-lol`.
+    pub(crate) fn other_preset_in_name(&self, file: &Path) -> Option<String> {
         let stem = file.file_stem()?.to_string_lossy().to_lowercase();
-        let words: Vec<&str> = stem.split(|c: char| !c.is_alphabetic()).collect();
-        let all_letters = letters(&stem);
-        // A short name may be a part of any word.
-        let is_named = |name: &str| {
-            let name = letters(name);
-            words.contains(&&*name) || name.len() > SHORT && all_letters.contains(&name)
-        };
-        let family = |name: &str| match name.split_once('-') {
-            Some((family @ ("ruas" | "pairlie"), _)) => family.to_owned(),
-            _ => name.trim_end_matches('+').to_owned(),
-        };
-        if is_named(&family(&self.name.replace("-pp", "++"))) {
+        if name_occurs(family(&self.name.replace("-pp", "++")), &stem) {
             return None;
         }
-        all()
+        all_presets()
             .ok()?
             .into_keys()
-            .filter(|name| is_named(name) || is_named(&family(name)))
-            .max_by_key(|name| (is_named(name), std::cmp::Reverse(name.len())))
+            .filter(|name| name_occurs(name, &stem) || name_occurs(family(name), &stem))
+            .max_by_key(|name| (name_occurs(name, &stem), std::cmp::Reverse(name.len())))
     }
 
-    /// The rules that choose an output.
+    /// Rules for choosing the image output.
     pub(crate) fn outputs(&self) -> PresetOutputs<'_> {
         PresetOutputs {
             names: &self.content.names,
@@ -329,10 +313,10 @@ impl Preset {
         }
     }
 
-    /// The preset's statements for a graph: the values of its further inputs, and how the image is read.
+    /// The preset's convention for a graph, with values for the inputs that the graph has and the choice of the image output.
     ///
     /// # Errors
-    /// If none of the outputs is known to be the image.
+    /// If the image output cannot be identified.
     pub(crate) fn for_graph(
         &self,
         sidecar: &ModelSidecar,
@@ -344,7 +328,7 @@ impl Preset {
             .iter()
             .filter_map(|port| {
                 let value = stated.extra.get(&port.name)?.clone();
-                // The same number at each pixel is the same for the model, whichever form its export takes.
+                // An export may take the number as a scalar or as a map; both mean the same to the model.
                 let value = match value {
                     ExtraValue::Number(number) if !port.is_scalar() => ExtraValue::Map(number),
                     ExtraValue::Map(number) if port.is_scalar() => ExtraValue::Number(number),
@@ -357,12 +341,12 @@ impl Preset {
             return Ok(stated);
         }
         if let Some(stacked) = &self.content.stacked {
-            let image = stacked.image_of(outputs).ok_or_else(|| {
+            let image = stacked.image_expression(outputs).ok_or_else(|| {
                 format!(
                     "does not match preset {}: expected one output of {} channels, found {}; export it as `darkqa-eval enhance presets` shows",
                     self.name,
                     stacked.channels,
-                    list(outputs)
+                    format_ports(outputs)
                 )
             })?;
             stated.image = Some(image);
@@ -371,28 +355,28 @@ impl Preset {
         if outputs.len() == 1 {
             return Ok(stated);
         }
-        if let Some(image) = self.content.image_of(outputs) {
+        if let Some(image) = self.content.image_expression(outputs) {
             stated.image = Some(image.clone());
             return Ok(stated);
         }
-        let found = self.content.by_name(outputs);
-        match found.or_else(|| self.content.by_channels(outputs)) {
+        let found = self.content.index_by_name(outputs);
+        match found.or_else(|| self.content.index_by_channels(outputs)) {
             Some(index) if index < outputs.len() => {
                 stated.output = Some(OutputChoice::Name(outputs[index].name.clone()));
                 Ok(stated)
             }
-            // Another output, such as curves, cannot be a part of the image.
+            // The other outputs, such as curves, cannot be images.
             _ if self.is_only_image(outputs) => Ok(stated),
             _ => Err(format!(
                 "does not match preset {}: expected {}, found {}; {ADD} the one that is the image: `output = \"NAME\"`",
                 self.name,
                 self.known_outputs(),
-                list(outputs)
+                format_ports(outputs)
             )),
         }
     }
 
-    /// Whether one output alone has three channels or one, or may have.
+    /// True if the image is a single output, and exactly one output can have one or three channels.
     fn is_only_image(&self, outputs: &[Port]) -> bool {
         self.content.image.is_none()
             && outputs
@@ -403,20 +387,23 @@ impl Preset {
     }
 
     /// Differences between a graph and the authors' model; `None` if there are none.
-    pub(crate) fn differing(&self, inputs: &[Port], outputs: &[Port]) -> Option<String> {
+    pub(crate) fn differences(&self, inputs: &[Port], outputs: &[Port]) -> Option<String> {
         let content = &self.content;
-        let known = outputs.len() == 1
-            || content.image_of(outputs).is_some()
-            || content.by_channels(outputs).is_some();
-        let is_stacked = |stacked: &StackedOutput| stacked.image_of(outputs).is_some();
-        let known = content.stacked.as_ref().map_or(known, is_stacked);
+        let is_known = match &content.stacked {
+            Some(stacked) => stacked.image_expression(outputs).is_some(),
+            None => {
+                outputs.len() == 1
+                    || content.image_expression(outputs).is_some()
+                    || content.index_by_channels(outputs).is_some()
+            }
+        };
         // Some authors' models have one output; an export that adds others identifies it by name.
-        let named = content.signatures.is_empty() && content.by_name(outputs).is_some();
-        if !known && !named {
+        let is_named = content.signatures.is_empty() && content.index_by_name(outputs).is_some();
+        if !is_known && !is_named {
             return Some(format!(
                 "outputs differ from the preset: expected {}, found {}",
                 self.known_outputs(),
-                list(outputs)
+                format_ports(outputs)
             ));
         }
         let others: Vec<Port> = inputs
@@ -424,11 +411,15 @@ impl Preset {
             .filter(|port| !content.sidecar.extra.contains_key(&port.name))
             .cloned()
             .collect();
-        (others.len() > 1)
-            .then(|| format!("inputs differ from the preset: found {}", list(&others)))
+        (others.len() > 1).then(|| {
+            format!(
+                "inputs differ from the preset: found {}",
+                format_ports(&others)
+            )
+        })
     }
 
-    /// The outputs that the preset knows, in words.
+    /// Description of the outputs that the preset expects.
     fn known_outputs(&self) -> String {
         let content = &self.content;
         let mut known = vec![format!("an image named {}", content.names.join(" or "))];
@@ -441,6 +432,28 @@ impl Preset {
         }));
         known.join("; or ")
     }
+}
+
+/// Name shared by the variants of a preset: `ruas` for `ruas-lol`, `zero-dce` for `zero-dce++`.
+fn family(name: &str) -> &str {
+    match name.split_once('-') {
+        Some((family @ ("ruas" | "pairlie"), _)) => family,
+        _ => name.trim_end_matches('+'),
+    }
+}
+
+/// True if a lower-case file stem contains a preset name. Punctuation is ignored; short names must be whole words.
+fn name_occurs(name: &str, stem: &str) -> bool {
+    let name = letters_of(name);
+    stem.split(|c: char| !c.is_alphabetic())
+        .any(|word| word == name)
+        || name.len() > MAX_SHORT_NAME && letters_of(stem).contains(&name)
+}
+
+/// Letters and digits of a text, in lower case.
+fn letters_of(text: &str) -> String {
+    text.to_lowercase()
+        .replace(|c: char| !c.is_alphanumeric(), "")
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Statements about a model, in the user's `MODEL.onnx.toml` beside it or in a preset: [`ModelSidecar`].
+//! Input and output convention stated in the user's `MODEL.onnx.toml` or in a preset: [`ModelSidecar`].
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::convention::{
-    ChannelOrder, Channels, Padding, Rounding, TensorLayout, Tile, ValueRange, ValueScale,
+    ChannelOrder, Channels, Locality, Padding, Rounding, TensorLayout, ValueRange, ValueScale,
 };
 use super::extra::ExtraValue;
 use crate::expressions::Expression;
@@ -18,7 +18,7 @@ use darkqa_ground::error::{Error, Result};
 use darkqa_ground::files::reading;
 use darkqa_ground::types::text::TomlFault;
 
-/// Statements of a sidecar. Every key may be missing; an unknown key is an error.
+/// Content of a sidecar. Every key is optional; an unknown key is an error.
 #[derive(Debug, Default, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct ModelSidecar {
@@ -28,7 +28,7 @@ pub(crate) struct ModelSidecar {
     pub(crate) layout_out: Option<TensorLayout>,
     /// Order of the channels of input and output.
     pub(crate) color: Option<ChannelOrder>,
-    /// Order of the channels of the output, if it is another.
+    /// Order of the channels of the output, if it differs from `color`.
     pub(crate) color_out: Option<ChannelOrder>,
     /// Channels of input and output.
     pub(crate) channels: Option<Channels>,
@@ -40,36 +40,36 @@ pub(crate) struct ModelSidecar {
     pub(crate) range_in: Option<ValueRange>,
     /// Values of black and white in the output.
     pub(crate) range_out: Option<ValueRange>,
-    /// Number subtracted from each channel of the input, in its channel order and range.
+    /// Means subtracted from the channels of the input, in its channel order and range.
     pub(crate) mean: Option<[f32; 3]>,
-    /// Number that each channel is then divided by.
+    /// Standard deviations by which the channels of the input are then divided.
     pub(crate) std: Option<[f32; 3]>,
-    /// Number added to each channel of the output, in its channel order and range.
+    /// Means added to the channels of the output after the multiplication by `std_out`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) mean_out: Option<[f32; 3]>,
-    /// Number that each channel of the output is multiplied by before.
+    /// Standard deviations by which the channels of the output are multiplied.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) std_out: Option<[f32; 3]>,
-    /// Height and width must be multiples of this many pixels.
+    /// Number of pixels of which height and width must be multiples.
     pub(crate) multiple: Option<NonZeroUsize>,
-    /// Pixels that fill an image up to a multiple.
+    /// Padding up to the multiple.
     pub(crate) pad: Option<Padding>,
-    /// Whether at least one row and one column are filled, even if the sides are multiples already.
+    /// True if at least one row and one column are padded, even if the sides are multiples already.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) pad_always: Option<bool>,
-    /// The only width and height that a graph accepts: tracing froze them, although the graph declares any size.
+    /// The only accepted width and height, for a graph that declares any size but was traced for this one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) fixed: Option<[NonZeroUsize; 2]>,
     /// Output that is the enhanced image.
     pub(crate) output: Option<OutputChoice>,
-    /// Whether tiles are exact, and with which context.
-    pub(crate) tile: Option<Tile>,
+    /// Context with which tiles are exact, or that the model needs the whole image.
+    pub(crate) tile: Option<Locality>,
     /// Rounding of values to bytes.
     pub(crate) rounding: Option<Rounding>,
-    /// Data that the model was trained on, as reports name them; no part of a digest, because they decide no image.
+    /// Name of the training data, for reports. Not part of a digest, because it does not affect the images.
     #[serde(default, skip_serializing)]
     pub(crate) trained_on: Option<String>,
-    /// Values of further inputs, by their names.
+    /// Values of further inputs, by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub(crate) extra: BTreeMap<String, ExtraValue>,
 }
@@ -102,17 +102,17 @@ pub(crate) fn path_for(model: &Path) -> PathBuf {
     path.into()
 }
 
-/// How a message begins to propose lines of the sidecar.
+/// Start of messages that propose lines for the sidecar.
 pub(crate) const ADD: &str = "add to MODEL.onnx.toml next to it";
 
-/// A text in which the sidecar is `MODEL.onnx.toml`, with the name of the file.
-pub(crate) fn named(text: &str, model: &Path) -> String {
+/// Replaces the placeholder `MODEL.onnx.toml` in a text by the file name of the model's sidecar.
+pub(crate) fn insert_sidecar_name(text: &str, model: &Path) -> String {
     let path = path_for(model);
     let name = path.file_name().unwrap_or_default();
     text.replace("MODEL.onnx.toml", &name.to_string_lossy())
 }
 
-/// Text of a model's sidecar; empty if there is none.
+/// Content of a model's sidecar; empty without a file.
 pub(crate) fn text_for(model: &Path) -> Result<String> {
     let path = path_for(model);
     match fs::symlink_metadata(&path) {
@@ -132,62 +132,75 @@ pub(crate) fn text_for(model: &Path) -> Result<String> {
     }
 }
 
-/// Most letters of a line that a message repeats.
-const LONGEST_LINE: usize = 60;
+/// Maximum number of characters of a faulty line that a message quotes.
+const MAX_LINE: usize = 60;
 
-/// Where all keys stand.
+/// End of messages about wrong keys, with the page that lists all keys.
 const KEYS: &str =
     "; all keys: https://github.com/darkqa-eval/darkqa-eval/blob/main/src/docs/enhancers.md";
 
-/// Largest side, in pixels, that a sidecar may state; chosen: no image of this program is larger.
-const MOST_SIDE: usize = 1 << 16;
+/// Maximum side, in pixels, of the key `fixed`; chosen, because this program handles no larger images.
+const MAX_SIDE: usize = 1 << 16;
 
-/// Most pixels of the size that a sidecar may state: the default of `--decode max-pixels`.
-const MOST_PIXELS: usize = 100_000_000;
+/// Maximum area, in pixels, of the key `fixed`: the default of `--decode max-pixels`.
+const MAX_PIXELS: usize = 100_000_000;
 
-/// Largest multiple, in pixels; chosen: twice what any published model needs, and a small image filled up to it still fits anywhere.
-const MOST_MULTIPLE: usize = 1024;
+/// Maximum multiple, in pixels; chosen: twice the largest of any published model, and small images padded to it still fit into memory.
+const MAX_MULTIPLE: usize = 1024;
 
-/// Most characters of the name of training data; chosen, because it stands next to each result.
-const MOST_TRAINED_ON: usize = 60;
+/// Maximum length of the name of training data, in characters; chosen, because it is printed with each result.
+const MAX_TRAINED_ON: usize = 60;
 
-/// Most further inputs; chosen.
-const MOST_EXTRA: usize = 64;
+/// Maximum number of further inputs; chosen.
+const MAX_EXTRA: usize = 64;
 
-/// Largest mean and deviation, and the inverse of the smallest deviation; chosen.
-const MOST_SCALE: f32 = 1e6;
+/// Maximum mean and standard deviation, and the inverse of the minimum standard deviation; chosen.
+const MAX_SCALE: f32 = 1e6;
 
 impl ModelSidecar {
-    /// Parses the text of the sidecar of `model`.
+    /// Parses and checks the text of the sidecar of `model`.
     ///
     /// # Errors
     /// If a key is unknown or a value is not allowed; the message names the file.
     pub(crate) fn parse(model: &Path, text: &str) -> Result<Self> {
         let path = path_for(model);
-        let wrong = |problem: &str| Error::data(path.display(), format_args!("{problem}{KEYS}"));
         let sidecar: Self = toml::from_str(text).map_err(|e| {
             let TomlFault { line, problem } = TomlFault::new(text, &e);
-            let stated = text.lines().nth(line - 1).unwrap_or_default().trim();
-            let stated: String = stated.chars().take(LONGEST_LINE).collect();
+            let stated: String = text
+                .lines()
+                .nth(line - 1)
+                .unwrap_or_default()
+                .trim()
+                .chars()
+                .take(MAX_LINE)
+                .collect();
             Error::line(&path, line, format_args!("`{stated}`: {problem}{KEYS}"))
         })?;
-        sidecar.check_bounds().map_err(|problem| wrong(&problem))?;
-        if sidecar.output.is_some() && sidecar.image.is_some() {
-            return Err(wrong(
-                "`output` and `image` are both set; delete `output`, because `image` names its outputs",
-            ));
+        match sidecar.check() {
+            Ok(()) => Ok(sidecar),
+            Err(problem) => Err(Error::data(path.display(), format_args!("{problem}{KEYS}"))),
         }
-        let mut checks = sidecar.extra.iter().map(|(name, value)| value.check(name));
-        let input = sidecar.input.as_ref();
-        let input = input.map_or(Ok(()), |input| input.check_names("input", &["image"]));
-        checks
-            .find(Result::is_err)
-            .unwrap_or(input)
-            .map_err(|problem| wrong(&problem))?;
-        Ok(sidecar)
     }
 
-    /// Mean and deviation of the output; `None` if neither is stated.
+    /// Checks everything that needs no graph.
+    fn check(&self) -> Result<(), String> {
+        self.check_bounds()?;
+        if self.output.is_some() && self.image.is_some() {
+            return Err(
+                "`output` and `image` are both set; delete `output`, because `image` names its outputs"
+                    .to_owned(),
+            );
+        }
+        for (name, value) in &self.extra {
+            value.check(name)?;
+        }
+        match &self.input {
+            Some(input) => input.check_names("input", &["image"]),
+            None => Ok(()),
+        }
+    }
+
+    /// Means and standard deviations of the output; `None` if neither is stated.
     pub(crate) fn mean_and_std_out(&self) -> Option<[[f32; 3]; 2]> {
         let is_stated = self.mean_out.is_some() || self.std_out.is_some();
         is_stated.then(|| {
@@ -198,8 +211,8 @@ impl ModelSidecar {
         })
     }
 
-    /// The same statements with an input of these values.
-    pub(crate) fn fed(self, scale: ValueScale) -> Self {
+    /// The sidecar with another scale of the input.
+    pub(crate) fn with_input_scale(self, scale: ValueScale) -> Self {
         let [mean, std] = scale
             .mean_and_std()
             .map_or([self.mean, self.std], |both| both.map(Some));
@@ -211,8 +224,8 @@ impl ModelSidecar {
         }
     }
 
-    /// The same statements with an output of these values.
-    pub(crate) fn read(self, scale: ValueScale) -> Self {
+    /// The sidecar with another scale of the output.
+    pub(crate) fn with_output_scale(self, scale: ValueScale) -> Self {
         let stated = [self.mean_out, self.std_out];
         let [mean_out, std_out] = scale.mean_and_std().map_or(stated, |both| both.map(Some));
         Self {
@@ -223,47 +236,52 @@ impl ModelSidecar {
         }
     }
 
-    /// Checks that no number makes an image too large or a value unusable.
+    /// Checks that numbers are within their bounds.
     fn check_bounds(&self) -> Result<(), String> {
-        let means = [self.mean, self.mean_out].into_iter().flatten().flatten();
-        let mut deviations = [self.std, self.std_out].into_iter().flatten().flatten();
-        if !means.map(f32::abs).all(|mean| mean <= MOST_SCALE)
-            || !deviations.all(|number: f32| (1.0 / MOST_SCALE..=MOST_SCALE).contains(&number))
-        {
+        let are_means_valid = [self.mean, self.mean_out]
+            .into_iter()
+            .flatten()
+            .flatten()
+            .all(|mean: f32| mean.abs() <= MAX_SCALE);
+        let are_deviations_valid = [self.std, self.std_out]
+            .into_iter()
+            .flatten()
+            .flatten()
+            .all(|deviation: f32| (1.0 / MAX_SCALE..=MAX_SCALE).contains(&deviation));
+        if !are_means_valid || !are_deviations_valid {
             return Err(format!(
-                "`mean` takes three numbers of at most {MOST_SCALE}, `std` three from {} to {MOST_SCALE}",
-                1.0 / MOST_SCALE
+                "`mean` takes three numbers of at most {MAX_SCALE}, `std` three from {} to {MAX_SCALE}",
+                1.0 / MAX_SCALE
             ));
         }
         if self
             .multiple
-            .is_some_and(|multiple| multiple.get() > MOST_MULTIPLE)
+            .is_some_and(|multiple| multiple.get() > MAX_MULTIPLE)
         {
-            return Err(format!("`multiple` can be at most {MOST_MULTIPLE} pixels"));
+            return Err(format!("`multiple` can be at most {MAX_MULTIPLE} pixels"));
         }
         if let Some([width, height]) = self.fixed {
-            let is_too_long = width.max(height).get() > MOST_SIDE;
-            if is_too_long || width.get() * height.get() > MOST_PIXELS {
+            let is_too_long = width.max(height).get() > MAX_SIDE;
+            if is_too_long || width.get() * height.get() > MAX_PIXELS {
                 return Err(format!(
-                    "the sides in `fixed` can be at most {MOST_SIDE} pixels, and their product at most {MOST_PIXELS}"
+                    "the sides in `fixed` can be at most {MAX_SIDE} pixels, and their product at most {MAX_PIXELS}"
                 ));
             }
         }
-        let is_line = |text: &String| {
-            text.chars().count() <= MOST_TRAINED_ON && !text.contains(char::is_control)
-        };
-        if !self.trained_on.iter().all(is_line) {
+        if self.trained_on.as_ref().is_some_and(|text| {
+            text.chars().count() > MAX_TRAINED_ON || text.contains(char::is_control)
+        }) {
             return Err(format!(
-                "`trained_on` must be one line of at most {MOST_TRAINED_ON} characters"
+                "`trained_on` must be one line of at most {MAX_TRAINED_ON} characters"
             ));
         }
-        if self.extra.len() > MOST_EXTRA {
-            return Err(format!("`[extra]` can have at most {MOST_EXTRA} inputs"));
+        if self.extra.len() > MAX_EXTRA {
+            return Err(format!("`[extra]` can have at most {MAX_EXTRA} inputs"));
         }
         Ok(())
     }
 
-    /// The sidecar without statements that equal the defaults, so that sidecars of the same meaning have the same digest.
+    /// The sidecar without keys that equal the defaults, so that sidecars of the same meaning have the same digest.
     pub(crate) fn without_defaults(self) -> Self {
         fn unless<T: PartialEq>(value: Option<T>, default: &T) -> Option<T> {
             value.filter(|value| value != default)
@@ -286,11 +304,11 @@ impl ModelSidecar {
         }
     }
 
-    /// The statements of this sidecar, and those of a preset for the missing keys.
+    /// The sidecar with missing keys taken from a preset.
     pub(crate) fn with_defaults(self, preset: &Self) -> Self {
         let mut extra = preset.extra.clone();
         extra.extend(self.extra);
-        // Either key selects the output to read.
+        // Both keys select the output to read, so one of them overrides both of the preset's.
         let (output, image) = match (self.output, self.image) {
             (None, None) => (preset.output.clone(), preset.image.clone()),
             stated => stated,
@@ -355,7 +373,7 @@ mod tests {
         "#;
         let read = ModelSidecar::parse(Path::new("m.onnx"), text).unwrap();
         assert_eq!(read.layout_in, Some(TensorLayout::Nhwc));
-        assert_eq!(read.tile, Some(Tile::Exact(12)));
+        assert_eq!(read.tile, Some(Locality::Exact(12)));
         assert_eq!(read.extra.len(), 2);
         assert_eq!(
             (read.color_out, read.channels),
@@ -372,7 +390,7 @@ mod tests {
     }
 
     #[test]
-    fn unknown_keys_and_values_are_errors_that_name_the_file() {
+    fn errors_about_keys_and_values_name_the_file() {
         let model = Path::new("a/model.onnx");
         for (text, part) in [
             (

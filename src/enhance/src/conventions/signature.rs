@@ -1,28 +1,28 @@
 //! Roles of a graph's tensors: the degraded image, the enhanced image and further inputs ([`Signature::infer`]).
 //!
-//! A graph states element types, ranks and fixed sizes. Value range and colour order come from a sidecar or a preset; by
-//! default they are those of the published models: RGB, 0..1.
+//! A graph declares element types, ranks and fixed sizes. Value range and colour order come from a sidecar or a preset; the default is that
+//! of most published models, RGB in 0..1.
 
 use super::convention::{Channels, TensorLayout};
 use super::sidecar::{ADD, ModelSidecar};
-use crate::graphs::{Port, list};
+use crate::graphs::{Port, format_ports};
 use crate::inputs::{FurtherInput, is_map_or_noise};
 use crate::outputs::Output;
 
-/// Inputs and outputs of a graph, by their roles.
+/// Inputs and outputs of a graph, by role.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Signature {
     /// The input that is the degraded image.
     pub(crate) input: ImageInput,
-    /// Height that the input must have, in pixels; `None` for any.
+    /// Fixed height of the input, in pixels; `None` for any.
     pub(crate) height: Option<usize>,
-    /// Width that the input must have, in pixels; `None` for any.
+    /// Fixed width of the input, in pixels; `None` for any.
     pub(crate) width: Option<usize>,
     /// Further inputs.
     pub(crate) extras: Vec<FurtherInput>,
-    /// The output that is the enhanced image, or those that its expression names, in its order.
+    /// The output that is the enhanced image, or the outputs named by the expression `image`, in its order.
     pub(crate) outputs: Vec<Output>,
-    /// The outputs that are not read.
+    /// Outputs that are not used.
     pub(crate) unread: Vec<Port>,
 }
 
@@ -36,26 +36,21 @@ pub(crate) struct ImageInput {
 }
 
 impl Signature {
-    /// Finds the role of each tensor.
+    /// Infers the role of each tensor.
     ///
     /// # Errors
-    /// The finding and the remedy, to follow the file's name.
+    /// A message with a remedy, to follow the file's name.
     pub(crate) fn infer(
         inputs: &[Port],
         outputs: &[Port],
         convention: &ModelSidecar,
     ) -> Result<Self, String> {
         let (image, layout) = image_input(inputs, convention)?;
-        let [_, height, width] = layout.places().map(|place| &image.dims[place]);
+        let [_, height, width] = layout.axes().map(|place| &image.dims[place]);
         let channels = convention.channels.unwrap_or_default();
-        let not_one = |key: &str, numbers: Option<[f32; 3]>| {
-            let numbers = numbers
-                .filter(|[a, b, c]| a.to_bits() != b.to_bits() || b.to_bits() != c.to_bits());
-            numbers.map(|numbers| format!("takes one channel (channels = \"y\"), but {key} = {numbers:?} in MODEL.onnx.toml or the preset has different numbers; write the same one three times"))
-        };
-        let mismatch = not_one("mean", convention.mean).or(not_one("std", convention.std));
-        if let (Channels::Y, Some(problem)) = (channels, mismatch) {
-            return Err(problem);
+        if channels == Channels::Y {
+            check_equal("mean", convention.mean)?;
+            check_equal("std", convention.std)?;
         }
         let input = ImageInput {
             port: image.clone(),
@@ -69,13 +64,14 @@ impl Signature {
                 FurtherInput::new(port, value, layout, input.takes_any_side())
             })
             .collect::<Result<Vec<_>, String>>()?;
-        let mut stated = convention.extra.keys();
-        if let Some(name) =
-            stated.find(|name| !extras.iter().any(|extra| extra.port.name == **name))
+        if let Some(name) = convention
+            .extra
+            .keys()
+            .find(|name| !extras.iter().any(|extra| extra.port.name == **name))
         {
             return Err(format!(
                 "MODEL.onnx.toml sets {name:?} under [extra], which is not an input besides the image; delete that line; inputs: {}",
-                list(inputs)
+                format_ports(inputs)
             ));
         }
         let fits = |port: &Port, count: usize| {
@@ -86,7 +82,7 @@ impl Signature {
             port.can_be_image(layout, count, [height, width])
         };
         let read = match &convention.image {
-            Some(expression) => Output::named(outputs, expression, channels, fits)?,
+            Some(expression) => Output::for_expression(outputs, expression, channels, fits)?,
             None => vec![Output::choose(
                 outputs,
                 convention.output.as_ref(),
@@ -94,22 +90,39 @@ impl Signature {
                 fits,
             )?],
         };
-        let is_unread = |port: &&Port| !read.iter().any(|output| output.port.name == port.name);
+        let unread = outputs
+            .iter()
+            .filter(|port| !read.iter().any(|output| output.port.name == port.name))
+            .cloned()
+            .collect();
         Ok(Self {
             height: height.known(),
             width: width.known(),
             extras,
-            unread: outputs.iter().filter(is_unread).cloned().collect(),
+            unread,
             outputs: read,
             input,
         })
     }
 }
 
+/// Checks that the numbers for the channels of a model of the luma are equal; `key` is the sidecar's.
+fn check_equal(key: &str, numbers: Option<[f32; 3]>) -> Result<(), String> {
+    match numbers {
+        Some([a, b, c]) if a.to_bits() != b.to_bits() || b.to_bits() != c.to_bits() => {
+            Err(format!(
+                "takes one channel (channels = \"y\"), but {key} = {:?} in MODEL.onnx.toml or the preset has different numbers; write the same one three times",
+                [a, b, c]
+            ))
+        }
+        _ => Ok(()),
+    }
+}
+
 impl ImageInput {
-    /// Whether it takes images of any height or width.
+    /// True if the input accepts any height or any width.
     pub(crate) fn takes_any_side(&self) -> bool {
-        let [_, height, width] = self.layout.places();
+        let [_, height, width] = self.layout.axes();
         [height, width]
             .iter()
             .any(|place| self.port.dims[*place].known().is_none())
@@ -117,10 +130,10 @@ impl ImageInput {
 }
 
 impl Signature {
-    /// Whether an output can be an image of one or three channels of the input's size.
+    /// True if an output can be an image of the input's size with one or three channels.
     pub(crate) fn has_image_size(&self, port: &Port) -> bool {
         let layout = self.input.layout;
-        let [_, height, width] = layout.places().map(|place| &self.input.port.dims[place]);
+        let [_, height, width] = layout.axes().map(|place| &self.input.port.dims[place]);
         [1, 3].into_iter().any(|count| {
             let layout = port.layout(count).unwrap_or(layout);
             port.channels().is_some() && port.can_be_image(layout, count, [height, width])
@@ -128,7 +141,7 @@ impl Signature {
     }
 }
 
-/// The input that is the image, and its layout.
+/// Finds the input that is the image, and its layout.
 fn image_input<'a>(
     inputs: &'a [Port],
     convention: &ModelSidecar,
@@ -138,7 +151,7 @@ fn image_input<'a>(
         .iter()
         .filter(|port| !port.is_scalar() && !convention.extra.contains_key(&port.name))
         .collect();
-    // If all but one lack a value, the message names the first of those.
+    // Without a clear candidate, take the first one: the error message then names it.
     let Some(image) = images
         .iter()
         .find(|port| port.layout(channels.count()).is_some() && !is_map_or_noise(&port.name))
@@ -147,7 +160,7 @@ fn image_input<'a>(
     else {
         if let Some(port) = inputs
             .iter()
-            .find(|port| port.dims.is_empty() && port.element.is_fed())
+            .find(|port| port.dims.is_empty() && port.element.is_input_type())
         {
             return Err(format!(
                 "takes {port}, an input without a shape; export it with one, such as [1, 3, height, width]"
@@ -155,10 +168,10 @@ fn image_input<'a>(
         }
         return Err(format!(
             "has no input that can be an image; export it with an input of [1, 3, height, width]; inputs: {}",
-            list(inputs)
+            format_ports(inputs)
         ));
     };
-    if !image.element.is_fed() {
+    if !image.element.is_input_type() {
         return Err(format!(
             "takes {image}, an unsupported type; export it with float32, float16 or uint8"
         ));
@@ -190,19 +203,19 @@ fn image_input<'a>(
         (None, None) if image.may_be_image() => {
             return Err(format!(
                 "takes {image}, whose shape does not show where the {} are; {ADD}: `layout_in = \"nchw\"` (or nhwc, chw, hwc)",
-                channels.words()
+                channels.description()
             ));
         }
         (None, None) => {
             return Err(format!(
                 "takes {image}, which is not an image of {}; export it for images of [1, {}, height, width]",
-                channels.words(),
+                channels.description(),
                 channels.count()
             ));
         }
     };
     match layout {
-        Some(layout) if image.dims[layout.places()[0]].can_be(channels.count()) => {
+        Some(layout) if image.dims[layout.axes()[0]].can_be(channels.count()) => {
             Ok((image, layout))
         }
         _ => Err(format!(
@@ -211,27 +224,23 @@ fn image_input<'a>(
     }
 }
 
-/// Why an input of these dimensions cannot be the image, and what to export instead; `None` if it can be one.
+/// Reason why an input of these dimensions cannot be the image, with export advice; `None` if it can.
 fn unusable_shape(port: &Port) -> Option<String> {
-    let several = |count: usize| {
-        format!(
-            "{count} channels, but an image has 3; export it so that it takes the image alone and computes the other channels in the graph"
-        )
-    };
     let [three, one] = [3, 1].map(|count| port.layout(count).is_some());
     match port.dims.len() {
         ..3 => {
             Some("a vector, not an image; export it for images of [1, 3, height, width]".to_owned())
         }
         3 | 4 if three || one => None,
-        3 | 4 => {
-            let counts = port.channel_counts();
-            counts
-                .into_iter()
-                .filter(|count| (2..=16).contains(count))
-                .find(|count| *count != 3)
-                .map(several)
-        }
+        3 | 4 => port
+            .channel_counts()
+            .into_iter()
+            .find(|count| (2..=16).contains(count) && *count != 3)
+            .map(|count| {
+                format!(
+                    "{count} channels, but an image has 3; export it so that it takes the image alone and computes the other channels in the graph"
+                )
+            }),
         rank => Some(format!(
             "several frames at a time ({rank} dimensions); export it for single images of [1, 3, height, width]"
         )),

@@ -1,4 +1,4 @@
-//! More sessions of one enhancer, which work at the same time: [`Enhancer::twin`].
+//! Copies of an enhancer that run in parallel: [`Enhancer::twin`].
 
 use std::num::NonZeroUsize;
 
@@ -9,20 +9,20 @@ use crate::limits::memory;
 use darkqa_ground::error::{Error, Result};
 
 impl Enhancer {
-    /// The same enhancer in a session and on a thread of its own. It knows what this one has learned, and shares its note. `number`
-    /// tells the twins apart.
+    /// A copy of this enhancer with its own session and thread. It starts with the sizes, context and memory cost measured so far, and
+    /// shares the usage record, in which `number` identifies the twin.
     ///
     /// # Errors
-    /// If the model's file was changed, or its session cannot be opened.
+    /// If the model's file has changed, or its session cannot be opened.
     pub fn twin(&self, number: usize, threads: NonZeroUsize) -> Result<Self> {
-        let file = ModelFile::read(&self.named)?;
+        let file = ModelFile::read(&self.argument)?;
         if file.digest() != self.digest {
             return Err(Error::Enhancer {
                 path: self.path.clone(),
                 problem: "was changed during the run; restore it, or start a new run".to_owned(),
             });
         }
-        let runtime = self.graph.runtime().beside()?;
+        let runtime = self.graph.runtime().with_new_thread()?;
         let limits = LoadLimits {
             time: self.graph.time_limit(),
             memory: self.graph.memory_limit(),
@@ -31,7 +31,7 @@ impl Enhancer {
         twin.graph = twin
             .graph
             .with_convention(self.convention().clone())
-            .map_err(|problem| self.fault(problem))?;
+            .map_err(|problem| self.error(problem))?;
         Ok(Self {
             tiling: self.tiling,
             fitting: self.fitting,
@@ -48,15 +48,15 @@ impl Enhancer {
     }
 }
 
-/// Number of sets of enhancers that can work at the same time: at most `cores`, and at most the number that fits in free memory. The memory
-/// of one set is estimated as that of the process after the first image of each enhancer.
+/// Number of sets of enhancers that can run in parallel: at most `cores`, and as many as fit into the free memory. The memory of one set is
+/// estimated as the resident memory of the process, to be measured after the first image of each enhancer.
 pub fn sets_in_memory(cores: usize) -> usize {
     match (memory::resident(), memory::available()) {
         (Some(resident), Some(available)) => {
             let more = available / resident.max(1);
             cores.min(1 + usize::try_from(more).unwrap_or(cores))
         }
-        // Where nothing is known of memory, one set is as much as was tried.
+        // Without figures about memory, only one set is known to fit.
         _ => 1,
     }
 }

@@ -1,6 +1,6 @@
-//! Some channels of an output, as `x[4:7]` names them in a sidecar: [`ChannelSlice`].
+//! Range of an output's channels, written `x[4:7]` in a sidecar: [`ChannelSlice`].
 
-/// Channels from `first` up to, but without, `end`, counted from 0.
+/// Range of channels, counted from 0; `end` is excluded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct ChannelSlice {
     pub(crate) first: usize,
@@ -8,7 +8,7 @@ pub(crate) struct ChannelSlice {
 }
 
 impl ChannelSlice {
-    /// Splits `x[4:7]` into the name of the output and its channels; `None` if the text does not end with a slice.
+    /// Splits `x[4:7]` into the output's name and the slice; `None` if the text does not end with a slice.
     pub(crate) fn split(text: &str) -> Option<(&str, Self)> {
         let (name, slice) = text.trim_end().strip_suffix(']')?.rsplit_once('[')?;
         let (first, end) = slice.split_once(':')?;
@@ -27,18 +27,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_slice_stands_in_brackets_behind_the_name() {
-        let slice = |first, end| ChannelSlice { first, end };
-        for (text, expected) in [
-            ("x[4:7]", Some(("x", slice(4, 7)))),
-            ("a[0][ 1 : 2 ]", Some(("a[0]", slice(1, 2)))),
-            ("x", None),
-            ("x[4]", None),
-            ("x[7:4]", None),
-            ("x[-1:2]", None),
-        ] {
-            assert_eq!(ChannelSlice::split(text), expected, "{text}");
+    fn slice_follows_the_name_in_brackets() {
+        let slice = ChannelSlice { first: 4, end: 7 };
+        assert_eq!(slice.count(), 3);
+        assert_eq!(ChannelSlice::split("x[4:7]"), Some(("x", slice)));
+        let spaced = ChannelSlice { first: 1, end: 2 };
+        assert_eq!(ChannelSlice::split("a[0][ 1 : 2 ]"), Some(("a[0]", spaced)));
+        for text in ["x", "x[4]", "x[7:4]", "x[-1:2]"] {
+            assert_eq!(ChannelSlice::split(text), None, "{text}");
         }
-        assert_eq!(slice(4, 7).count(), 3);
     }
 }

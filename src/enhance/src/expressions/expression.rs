@@ -1,9 +1,9 @@
-//! An expression of a sidecar, as `L ^ 0.2 * R`, computed at each pixel: [`Expression`].
+//! Pixelwise arithmetic expression of a sidecar, such as `L ^ 0.2 * R`: [`Expression`].
 //!
-//! It has numbers, names (those that are not made of letters, digits and `_` in backticks), `+ - * / ^ ( )`, and the functions
-//! `min`, `max`, `clip(x, low, high)`, `mean(x)`, the mean over the channels, and `curves(x, a, b, …)`, the curves of Zero-DCE. `x[4:7]`
-//! are three channels of the output `x`. `^` binds to the right, and a negative base
-//! counts as 0. One channel is spread to three where the other argument has three. All is computed in 32-bit floats.
+//! An expression has numbers, names (in backticks unless made of letters, digits and `_`), `+ - * / ^ ( )`, and the functions `min`,
+//! `max`, `clip(x, low, high)`, `mean(x)` (the mean over the channels) and `curves(x, a, b, …)` (the curves of Zero-DCE). `x[4:7]` selects
+//! three channels of the output `x`. `^` is right-associative, with negative bases taken as 0. One channel is broadcast to three where the
+//! other argument has three. All arithmetic is in 32-bit floats.
 
 use std::fmt;
 use std::str::FromStr;
@@ -13,7 +13,7 @@ use super::term::{Sample, Term};
 use crate::planes::Planes;
 use darkqa_ground::types::text::words::as_text;
 
-/// A function of images, pixel by pixel.
+/// Parsed expression, evaluated at each pixel.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Expression {
     text: String,
@@ -43,20 +43,20 @@ impl fmt::Display for Expression {
 as_text!(Expression);
 
 impl Expression {
-    /// Its names, each once.
+    /// Distinct names in the expression, in the order of their first use.
     pub(crate) fn names(&self) -> &[String] {
         &self.names
     }
 
-    /// Whether it is a single name.
+    /// True if the expression is just this name.
     pub(crate) fn is_name(&self, name: &str) -> bool {
         self.terms == [Term::Name(0)] && self.names[0] == name
     }
 
-    /// Checks that each name is one of `known`.
+    /// Checks that each name is one of `known`; `key` is the sidecar's key of the expression.
     ///
     /// # Errors
-    /// The names that are not, and all that there are.
+    /// A message with the unknown names and the known ones.
     pub(crate) fn check_names(&self, key: &str, known: &[&str]) -> Result<(), String> {
         let unknown: Vec<String> = self
             .names
@@ -76,16 +76,16 @@ impl Expression {
         ))
     }
 
-    /// The expression of images of one size, in the order of [`Expression::names`].
+    /// Evaluates the expression on images of one size, given in the order of [`Expression::names`].
     pub(crate) fn evaluate(&self, images: &[&Planes], [height, width]: [usize; 2]) -> Planes {
         let plane = height * width;
         let mut values = vec![Sample::One(0.0); images.len()];
         let mut stack = Vec::with_capacity(self.terms.len());
-        let shape: Vec<Sample> = images.iter().map(|image| image.sample(0)).collect();
         let channels = if plane == 0 {
             1
         } else {
-            match self.value(&shape, &mut stack) {
+            let first_pixel: Vec<Sample> = images.iter().map(|image| image.sample(0)).collect();
+            match self.value(&first_pixel, &mut stack) {
                 Sample::One(_) => 1,
                 Sample::Three(_) => 3,
             }
@@ -107,19 +107,22 @@ impl Expression {
         }
     }
 
-    /// Number of channels of the result; `names` are the numbers of channels of the names.
-    pub(crate) fn channels(&self, names: &[usize]) -> usize {
-        let names = names.iter().map(|channels| match channels {
-            1 => Sample::One(0.0),
-            _ => Sample::Three([0.0; 3]),
-        });
-        match self.value(&names.collect::<Vec<_>>(), &mut Vec::new()) {
+    /// Number of channels of the result, for images with these numbers of channels in the order of [`Expression::names`].
+    pub(crate) fn channels(&self, image_channels: &[usize]) -> usize {
+        let samples: Vec<Sample> = image_channels
+            .iter()
+            .map(|channels| match channels {
+                1 => Sample::One(0.0),
+                _ => Sample::Three([0.0; 3]),
+            })
+            .collect();
+        match self.value(&samples, &mut Vec::new()) {
             Sample::One(_) => 1,
             Sample::Three(_) => 3,
         }
     }
 
-    /// The value at one pixel; the stack is empty before and after.
+    /// Value at one pixel; `names` holds the values of the names. The stack is empty before and after.
     fn value(&self, names: &[Sample], stack: &mut Vec<Sample>) -> Sample {
         for term in &self.terms {
             let first = stack.len() - term.arguments();
@@ -135,7 +138,7 @@ impl Expression {
 mod tests {
     use super::*;
 
-    /// The value of an expression of x = 0.25, c = (0.5, 0.25, 1).
+    /// Value of an expression for c = (0.5, 0.25, 1) and 0.25 for any other name.
     fn value(text: &str) -> Sample {
         let expression: Expression = text.parse().unwrap();
         let names: Vec<Sample> = expression
@@ -150,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn precedence_is_the_usual_one() {
+    fn operators_have_the_usual_precedence() {
         for (text, expected) in [
             ("1 + 2 * 3", 7.0),
             ("(1 + 2) * 3", 9.0),
@@ -181,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn one_channel_is_spread_to_three() {
+    fn one_channel_is_broadcast_to_three() {
         assert_eq!(value("c * x"), Sample::Three([0.125, 0.0625, 0.25]));
         assert_eq!(value("1 - c"), Sample::Three([0.5, 0.75, 0.0]));
         assert_eq!(value("min(c, 0.5)"), Sample::Three([0.5, 0.25, 0.5]));
@@ -193,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_a_number_stays_so() {
+    fn nan_is_propagated() {
         for text in [
             "max(0 / 0, 1)",
             "min(1, 0 / 0)",
@@ -209,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_expression_says_where_and_what() {
+    fn syntax_errors_name_position_and_expected_element() {
         let cases = [
             ("", "at character 1, found the end"),
             ("1 +", "at character 4"),
@@ -255,8 +258,9 @@ mod tests {
     fn unknown_names_are_listed_with_the_known_ones() {
         let expression: Expression = "L ^ 0.2 * R".parse().unwrap();
         assert_eq!(expression.check_names("image", &["R", "L"]), Ok(()));
-        let message = expression.check_names("image", &["input", "R"]);
-        let message = message.unwrap_err();
+        let message = expression
+            .check_names("image", &["input", "R"])
+            .unwrap_err();
         assert!(
             message.contains("names `L`") && message.ends_with("the names are `input`, `R`"),
             "{message}"

@@ -1,4 +1,4 @@
-//! Expressions of sidecars, computed at each pixel.
+//! Pixelwise arithmetic expressions of sidecars.
 
 mod channel_slice;
 mod expression;

@@ -1,4 +1,4 @@
-//! Reading the text of a sidecar's expression: [`parse`].
+//! Recursive-descent parser of a sidecar's expression: [`parse`].
 //!
 //! ```text
 //! sum     = product { ("+" | "-") product }
@@ -11,32 +11,32 @@
 use super::channel_slice::ChannelSlice;
 use super::term::Term;
 
-/// Largest number of characters of an expression; chosen.
-const MOST_CHARACTERS: usize = 1000;
-/// Deepest nesting of parentheses, signs and powers, so that no text overflows the stack; chosen.
+/// Maximum length of an expression, in characters; chosen.
+const MAX_CHARACTERS: usize = 1000;
+/// Maximum nesting of parentheses, signs and powers, so that no text overflows the stack; chosen.
 const DEEPEST: usize = 50;
 
-/// Steps of an expression in postfix order, and its names in the order of their first use.
+/// Terms of an expression in postfix order, and its names in the order of their first use.
 pub(super) struct Parsed {
     pub(super) terms: Vec<Term>,
     pub(super) names: Vec<String>,
 }
 
-/// Reads an expression.
+/// Parses an expression.
 ///
 /// # Errors
-/// The expected element and the position in characters.
+/// A message with the expected element and its position in characters.
 pub(super) fn parse(text: &str) -> Result<Parsed, String> {
     let characters: Vec<char> = text.chars().collect();
-    if characters.len() > MOST_CHARACTERS {
+    if characters.len() > MAX_CHARACTERS {
         return Err(format!(
-            "the expression has {} characters; at most {MOST_CHARACTERS} are allowed",
+            "the expression has {} characters; at most {MAX_CHARACTERS} are allowed",
             characters.len()
         ));
     }
     let mut parser = Parser {
         characters,
-        at: 0,
+        position: 0,
         depth: 0,
         parsed: Parsed {
             terms: Vec::new(),
@@ -46,13 +46,13 @@ pub(super) fn parse(text: &str) -> Result<Parsed, String> {
     parser.sum()?;
     match parser.peek() {
         None => Ok(parser.parsed),
-        Some(_) => Err(parser.wrong("an operator or the end")),
+        Some(_) => Err(parser.error("an operator or the end")),
     }
 }
 
 struct Parser {
     characters: Vec<char>,
-    at: usize,
+    position: usize,
     depth: usize,
     parsed: Parsed,
 }
@@ -76,18 +76,18 @@ impl Parser {
         Ok(())
     }
 
-    /// All nesting goes through here.
+    /// Parses an operand with its signs and powers. All nesting passes through this function, which limits its depth.
     fn signed(&mut self) -> Result<(), String> {
         self.depth += 1;
         if self.depth > DEEPEST {
             return Err(format!("it is nested deeper than {DEEPEST} levels"));
         }
-        if self.taken('-') {
+        if self.accept('-') {
             self.signed()?;
             self.parsed.terms.push(Term::Negate);
         } else {
             self.atom()?;
-            if self.taken('^') {
+            if self.accept('^') {
                 self.signed()?;
                 self.parsed.terms.push(Term::Power);
             }
@@ -99,46 +99,44 @@ impl Parser {
     fn atom(&mut self) -> Result<(), String> {
         match self.peek() {
             Some('(') => {
-                self.at += 1;
+                self.position += 1;
                 self.sum()?;
                 self.close()
             }
             Some('`') => {
-                self.at += 1;
-                let name = self.word(|c| c != '`');
+                self.position += 1;
+                let name = self.take_while(|c| c != '`');
                 if self.peek() != Some('`') || name.is_empty() {
-                    return Err(self.wrong("a name that ends with a backtick"));
+                    return Err(self.error("a name that ends with a backtick"));
                 }
-                self.at += 1;
+                self.position += 1;
                 self.name(name)
             }
-            Some(c) if c.is_ascii_digit() || c == '.' => self.number(),
+            Some(c) if is_digit_or_point(c) => self.number(),
             Some(c) if c.is_ascii_alphabetic() || c == '_' => {
-                let start = self.at;
-                let word = self.word(|c| c.is_ascii_alphanumeric() || c == '_');
-                if self.taken('(') {
+                let start = self.position;
+                let word = self.take_while(|c| c.is_ascii_alphanumeric() || c == '_');
+                if self.accept('(') {
                     self.function(&word, start)
                 } else {
                     self.name(word)
                 }
             }
-            _ => Err(self.wrong("a number, a name or an opening parenthesis")),
+            _ => Err(self.error("a number, a name or an opening parenthesis")),
         }
     }
 
     fn number(&mut self) -> Result<(), String> {
-        let start = self.at;
-        let is_part = |c: char| c.is_ascii_digit() || c == '.';
-        let mut digits = self.word(is_part);
-        let mark = self.characters.get(self.at).copied();
-        if let Some(mark @ ('e' | 'E')) = mark {
-            digits.push(mark);
-            self.at += 1;
-            if let Some(sign @ ('+' | '-')) = self.characters.get(self.at).copied() {
+        let start = self.position;
+        let mut digits = self.take_while(is_digit_or_point);
+        if let Some(exponent @ ('e' | 'E')) = self.characters.get(self.position).copied() {
+            digits.push(exponent);
+            self.position += 1;
+            if let Some(sign @ ('+' | '-')) = self.characters.get(self.position).copied() {
                 digits.push(sign);
-                self.at += 1;
+                self.position += 1;
             }
-            digits.push_str(&self.word(is_part));
+            digits.push_str(&self.take_while(is_digit_or_point));
         }
         match digits.parse::<f32>() {
             Ok(number) if number.is_finite() => {
@@ -146,30 +144,31 @@ impl Parser {
                 Ok(())
             }
             _ => {
-                self.at = start;
-                Err(self.wrong("a finite number"))
+                self.position = start;
+                Err(self.error("a finite number"))
             }
         }
     }
 
-    fn function(&mut self, word: &str, start: usize) -> Result<(), String> {
+    /// Parses the arguments of the function `name`, which starts at `start`, after the opening parenthesis.
+    fn function(&mut self, name: &str, start: usize) -> Result<(), String> {
         self.sum()?;
         let mut arguments = 1;
-        while self.taken(',') {
+        while self.accept(',') {
             self.sum()?;
             arguments += 1;
         }
         self.close()?;
-        let term = match (word, arguments) {
+        let term = match (name, arguments) {
             ("min", count) => Term::Min(count),
             ("max", count) => Term::Max(count),
             ("clip", 3) => Term::Clip,
             ("mean", 1) => Term::Mean,
             ("curves", 2..) => Term::Curves(arguments),
             _ => {
-                self.at = start;
+                self.position = start;
                 return Err(
-                    self.wrong("min(…), max(…), clip(x, low, high), mean(x) or curves(x, a, …)")
+                    self.error("min(…), max(…), clip(x, low, high), mean(x) or curves(x, a, …)")
                 );
             }
         };
@@ -177,75 +176,83 @@ impl Parser {
         Ok(())
     }
 
-    /// A name, with the channels in brackets behind it, if there are any.
+    /// Parses the optional channel slice after a name, and adds the name's term.
     fn name(&mut self, mut name: String) -> Result<(), String> {
-        if self.taken('[') {
-            let slice = self.word(|c| c != ']');
+        if self.accept('[') {
+            let slice = self.take_while(|c| c != ']');
             name = format!("{name}[{slice}]");
-            if !self.taken(']') || ChannelSlice::split(&name).is_none() {
-                return Err(self.wrong("channels such as [4:7] (from 0, end excluded)"));
+            if !self.accept(']') || ChannelSlice::split(&name).is_none() {
+                return Err(self.error("channels such as [4:7] (from 0, end excluded)"));
             }
         }
         let names = &mut self.parsed.names;
-        let index = names.iter().position(|known| *known == name);
-        let index = index.unwrap_or_else(|| {
-            names.push(name);
-            names.len() - 1
-        });
+        let index = names
+            .iter()
+            .position(|known| *known == name)
+            .unwrap_or_else(|| {
+                names.push(name);
+                names.len() - 1
+            });
         self.parsed.terms.push(Term::Name(index));
         Ok(())
     }
 
     fn close(&mut self) -> Result<(), String> {
-        if self.taken(')') {
+        if self.accept(')') {
             Ok(())
         } else {
-            Err(self.wrong("an operator or a closing parenthesis"))
+            Err(self.error("an operator or a closing parenthesis"))
         }
     }
 
-    /// The next character that is no space.
+    /// Skips white space and returns the next character without consuming it.
     fn peek(&mut self) -> Option<char> {
         while self
             .characters
-            .get(self.at)
+            .get(self.position)
             .is_some_and(|c| c.is_whitespace())
         {
-            self.at += 1;
+            self.position += 1;
         }
-        self.characters.get(self.at).copied()
+        self.characters.get(self.position).copied()
     }
 
-    /// Whether the next character is this one, which is then passed.
-    fn taken(&mut self, wanted: char) -> bool {
-        let taken = self.peek() == Some(wanted);
-        self.at += usize::from(taken);
-        taken
+    /// Consumes the next character if it is `wanted`; returns whether it was.
+    fn accept(&mut self, wanted: char) -> bool {
+        let is_next = self.peek() == Some(wanted);
+        self.position += usize::from(is_next);
+        is_next
     }
 
     fn operator(&mut self, operators: &[(char, Term)]) -> Option<Term> {
         operators
             .iter()
-            .find(|(c, _)| self.taken(*c))
+            .find(|(c, _)| self.accept(*c))
             .map(|(_, term)| *term)
     }
 
-    /// The characters from here on that belong to a word.
-    fn word(&mut self, belongs: impl Fn(char) -> bool) -> String {
-        let word: String = self.characters[self.at..]
+    /// Consumes and returns the following characters that satisfy `accepts`.
+    fn take_while(&mut self, accepts: impl Fn(char) -> bool) -> String {
+        let text: String = self.characters[self.position..]
             .iter()
-            .take_while(|c| belongs(**c))
+            .take_while(|c| accepts(**c))
             .collect();
-        self.at += word.chars().count();
-        word
+        self.position += text.chars().count();
+        text
     }
 
-    fn wrong(&self, expected: &str) -> String {
-        let found = self.characters.get(self.at);
-        let found = found.map_or("the end".to_owned(), |c| format!("{c:?}"));
+    fn error(&self, expected: &str) -> String {
+        let found = match self.characters.get(self.position) {
+            None => "the end".to_owned(),
+            Some(c) => format!("{c:?}"),
+        };
         format!(
             "expected {expected} at character {}, found {found}",
-            self.at + 1
+            self.position + 1
         )
     }
+}
+
+fn is_digit_or_point(c: char) -> bool {
+    c.is_ascii_digit() || c == '.'
 }

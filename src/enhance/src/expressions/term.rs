@@ -1,13 +1,13 @@
-//! One step of a sidecar's expression, and the values it works on: [`Term`], [`Sample`].
+//! Elements of a sidecar's expression and their values: [`Term`], [`Sample`].
 
 use crate::conventions::LUMA;
 
-/// A step of an expression in postfix order: it takes its arguments from the end of a stack, and leaves one value there.
+/// Element of an expression in postfix order: pops its arguments from a stack and pushes one value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Term {
     /// A number.
     Number(f32),
-    /// The value of a name, by its index among the expression's names.
+    /// Value of the name with this index among the expression's names.
     Name(usize),
     /// −a
     Negate,
@@ -21,15 +21,15 @@ pub(super) enum Term {
     Divide,
     /// a to the power of b; a negative base counts as 0.
     Power,
-    /// The smallest of this many arguments; of a single one, the smallest of its channels.
+    /// Minimum of this number of arguments; for one argument, the minimum over its channels.
     Min(usize),
-    /// The largest of this many arguments; of a single one, the largest of its channels.
+    /// Maximum of this number of arguments; for one argument, the maximum over its channels.
     Max(usize),
-    /// The first argument, held between the second and the third.
+    /// The first argument, clamped to the range from the second to the third.
     Clip,
     /// Mean over the channels.
     Mean,
-    /// Zero-DCE's curves: x + a · (x² − x) for each further argument a, one after another.
+    /// Zero-DCE's curves: x ← x + a · (x² − x), applied for each further argument a in turn.
     Curves(usize),
 }
 
@@ -43,7 +43,7 @@ pub(crate) enum Sample {
 }
 
 impl Sample {
-    /// The three channels; one channel is spread to all.
+    /// The three channels; one channel is repeated.
     pub(super) fn spread(self) -> [f32; 3] {
         match self {
             Self::One(value) => [value; 3],
@@ -62,34 +62,34 @@ impl Sample {
         }
     }
 
-    /// A function of each channel.
-    fn map(self, with: impl Fn(f32) -> f32) -> Self {
+    /// Applies a function to each channel.
+    fn map(self, function: impl Fn(f32) -> f32) -> Self {
         match self {
-            Self::One(value) => Self::One(with(value)),
-            Self::Three(values) => Self::Three(values.map(with)),
+            Self::One(value) => Self::One(function(value)),
+            Self::Three(values) => Self::Three(values.map(function)),
         }
     }
 
-    /// A function of each channel of two values; one channel is spread to three if the other value has three.
-    fn with(self, other: Self, with: impl Fn(f32, f32) -> f32) -> Self {
+    /// Applies a function to each pair of channels; one channel is broadcast to three if the other value has three.
+    fn zip_with(self, other: Self, function: impl Fn(f32, f32) -> f32) -> Self {
         if let (Self::One(a), Self::One(b)) = (self, other) {
-            return Self::One(with(a, b));
+            return Self::One(function(a, b));
         }
         let (a, b) = (self.spread(), other.spread());
-        Self::Three([0, 1, 2].map(|channel: usize| with(a[channel], b[channel])))
+        Self::Three([0, 1, 2].map(|channel: usize| function(a[channel], b[channel])))
     }
 
-    /// The channels, combined to one.
-    fn folded(self, with: impl Fn(f32, f32) -> f32) -> Self {
+    /// Combines three channels into one; one channel stays as it is.
+    fn fold_channels(self, function: impl Fn(f32, f32) -> f32) -> Self {
         match self {
             Self::One(_) => self,
-            Self::Three([red, green, blue]) => Self::One(with(with(red, green), blue)),
+            Self::Three([red, green, blue]) => Self::One(function(function(red, green), blue)),
         }
     }
 }
 
 impl Term {
-    /// Number of arguments that the step takes from the stack.
+    /// Number of arguments that the term pops from the stack.
     pub(super) fn arguments(self) -> usize {
         match self {
             Self::Number(_) | Self::Name(_) => 0,
@@ -100,43 +100,43 @@ impl Term {
         }
     }
 
-    /// Value of the step. `names` holds the values of the names; `arguments` has [`Term::arguments`] elements.
+    /// Value of the term. `names` holds the values of the names; `arguments` has [`Term::arguments`] elements.
     ///
-    /// Powers are those of `libm`, so that every machine gives the same bytes.
+    /// Powers are computed by `libm`, so that every machine gives the same bytes.
     pub(super) fn value(self, names: &[Sample], arguments: &[Sample]) -> Sample {
         match (self, arguments) {
             (Self::Number(number), _) => Sample::One(number),
             (Self::Name(index), _) => names[index],
             (Self::Negate, [a]) => a.map(|a| -a),
-            (Self::Add, [a, b]) => a.with(*b, |a, b| a + b),
-            (Self::Subtract, [a, b]) => a.with(*b, |a, b| a - b),
-            (Self::Multiply, [a, b]) => a.with(*b, |a, b| a * b),
-            (Self::Divide, [a, b]) => a.with(*b, |a, b| a / b),
-            (Self::Power, [a, b]) => a.with(*b, |a, b| libm::powf(larger(a, 0.0), b)),
-            (Self::Min(1), [a]) => a.folded(smaller),
-            (Self::Max(1), [a]) => a.folded(larger),
-            (Self::Min(_), [a, rest @ ..]) => rest.iter().fold(*a, |a, b| a.with(*b, smaller)),
-            (Self::Max(_), [a, rest @ ..]) => rest.iter().fold(*a, |a, b| a.with(*b, larger)),
-            (Self::Clip, [a, low, high]) => a.with(*low, larger).with(*high, smaller),
+            (Self::Add, [a, b]) => a.zip_with(*b, |a, b| a + b),
+            (Self::Subtract, [a, b]) => a.zip_with(*b, |a, b| a - b),
+            (Self::Multiply, [a, b]) => a.zip_with(*b, |a, b| a * b),
+            (Self::Divide, [a, b]) => a.zip_with(*b, |a, b| a / b),
+            (Self::Power, [a, b]) => a.zip_with(*b, |a, b| libm::powf(larger(a, 0.0), b)),
+            (Self::Min(1), [a]) => a.fold_channels(smaller),
+            (Self::Max(1), [a]) => a.fold_channels(larger),
+            (Self::Min(_), [a, rest @ ..]) => rest.iter().fold(*a, |a, b| a.zip_with(*b, smaller)),
+            (Self::Max(_), [a, rest @ ..]) => rest.iter().fold(*a, |a, b| a.zip_with(*b, larger)),
+            (Self::Clip, [a, low, high]) => a.zip_with(*low, larger).zip_with(*high, smaller),
             (Self::Curves(_), [x, curves @ ..]) => curves
                 .iter()
-                .fold(*x, |x, a| x.with(*a, |x, a| x + a * (x * x - x))),
-            (Self::Mean, [a]) => match a.folded(|a, b| a + b) {
+                .fold(*x, |x, a| x.zip_with(*a, |x, a| x + a * (x * x - x))),
+            (Self::Mean, [a]) => match a.fold_channels(|a, b| a + b) {
                 Sample::One(sum) if matches!(a, Sample::Three(_)) => Sample::One(sum / 3.0),
                 same => same,
             },
-            // The parser gives each step its arguments.
+            // Unreachable: the parser gives each term the right number of arguments.
             _ => Sample::One(f32::NAN),
         }
     }
 }
 
-/// The smaller of two numbers; NaN if one of them is.
+/// Minimum of two numbers; NaN if one of them is NaN.
 fn smaller(a: f32, b: f32) -> f32 {
     if a.is_nan() || a < b { a } else { b }
 }
 
-/// The larger of two numbers; NaN if one of them is.
+/// Maximum of two numbers; NaN if one of them is NaN.
 fn larger(a: f32, b: f32) -> f32 {
     if a.is_nan() || a > b { a } else { b }
 }

@@ -1,4 +1,4 @@
-//! The enhancer that a word names: [`built_in`].
+//! Lookup of built-in enhancers by name: [`find_built_in`].
 
 use std::path::Path;
 
@@ -7,12 +7,12 @@ use darkqa_models::{BUILT_IN, BuiltIn};
 use darkqa_ground::error::{Error, Result};
 use darkqa_ground::types::text::near_name::nearest;
 
-/// The built-in enhancer of this name; `None` if the word is the path of a file, that is, has an extension or a folder. A file named `lift`
-/// is therefore never confused with the enhancer.
+/// Finds the built-in enhancer named by the argument of `--llie`. `None` if the argument is a path: it has an extension, a folder or a
+/// colon. So a file in the current folder that is named `lift` is never confused with the enhancer.
 ///
 /// # Errors
-/// If the word is neither.
-pub(super) fn built_in(word: &Path) -> Result<Option<&'static BuiltIn>> {
+/// If the argument is neither a path nor the name of a built-in enhancer.
+pub(super) fn find_built_in(word: &Path) -> Result<Option<&'static BuiltIn>> {
     let Some(text) = word.to_str() else {
         return Ok(None);
     };
@@ -38,27 +38,26 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_built_in_enhancer_is_its_file() {
+    fn built_in_enhancers_equal_their_files() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models");
-        let read = |word: &Path| ModelFile::read(word).unwrap();
         for BuiltIn { name, .. } in BUILT_IN {
-            let carried = read(Path::new(name));
-            let file = read(&folder.join(format!("{name}.onnx")));
-            assert_eq!(carried.name(), file.name());
-            assert_eq!(carried.digest(), file.digest(), "{name}");
-            assert!(carried.weights.external.is_empty(), "{name}");
+            let built_in = ModelFile::read(Path::new(name)).unwrap();
+            let file = ModelFile::read(&folder.join(format!("{name}.onnx"))).unwrap();
+            assert_eq!(built_in.name(), file.name());
+            assert_eq!(built_in.digest(), file.digest(), "{name}");
+            assert!(built_in.weights.external.is_empty(), "{name}");
         }
     }
 
     #[test]
-    fn a_word_with_an_extension_or_a_folder_is_a_file() {
+    fn argument_with_extension_or_folder_is_a_file() {
         for file in ["lift.onnx", "./lift", "models/lift", "C:lift", "lift.ort"] {
-            assert!(built_in(Path::new(file)).unwrap().is_none(), "{file}");
+            assert!(find_built_in(Path::new(file)).unwrap().is_none(), "{file}");
         }
-        let typo = built_in(Path::new("lfit")).err().unwrap().to_string();
+        let typo = find_built_in(Path::new("lfit")).err().unwrap().to_string();
         assert!(typo.contains("did you mean lift?"), "{typo}");
         for wrong in ["lfit", "zerodce", "Lift", ""] {
-            let message = built_in(Path::new(wrong)).err().unwrap().to_string();
+            let message = find_built_in(Path::new(wrong)).err().unwrap().to_string();
             assert!(
                 message.contains("lift, gray-gain") && message.contains("--llie"),
                 "{message}"

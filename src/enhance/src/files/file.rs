@@ -1,8 +1,8 @@
-//! An enhancement model, in a file or built in: [`ModelFile`].
+//! ONNX file of an enhancer, with its sidecar and digest: [`ModelFile`].
 
 use std::collections::BTreeMap;
 use std::io::ErrorKind;
-use std::ops::Range;
+
 use std::path::{Component, Path, PathBuf};
 
 use serde::Serialize;
@@ -11,8 +11,8 @@ use darkqa_ground::error::{Error, Result};
 use darkqa_ground::files::reading;
 use darkqa_ground::types::{Digest, EnhancerName};
 
-use super::built_in::built_in;
-use super::protobuf::{FieldValue, fields};
+use super::built_in::find_built_in;
+use super::protobuf::byte_fields;
 use super::weights::Weights;
 use crate::conventions::preset::{Preset, PresetOutputs};
 use crate::conventions::sidecar::{self, ModelSidecar, OutputChoice};
@@ -21,14 +21,14 @@ use crate::conventions::sidecar::{self, ModelSidecar, OutputChoice};
 #[derive(Debug)]
 pub struct ModelFile {
     /// The argument that names the model, as the user wrote it.
-    pub(crate) named: PathBuf,
+    pub(crate) argument: PathBuf,
     /// Path of the file; for a built-in enhancer, its name in messages.
     pub(crate) path: PathBuf,
     pub(crate) name: EnhancerName,
     pub(crate) digest: Digest,
     pub(crate) bytes: Vec<u8>,
     pub(crate) weights: Weights,
-    /// The sidecar of the model; empty if it has none.
+    /// The sidecar of the model; empty without a file.
     pub(crate) sidecar: ModelSidecar,
     /// The preset, if one was named.
     pub(crate) preset: Option<Preset>,
@@ -43,20 +43,20 @@ impl ModelFile {
     /// If a file cannot be read or is not an ONNX model, its name is not an [`EnhancerName`], the sidecar has an unknown key, or the
     /// built-in enhancer or the preset does not exist.
     pub fn read(model: &Path) -> Result<Self> {
-        if let Some(built_in) = built_in(model)? {
+        if let Some(built_in) = find_built_in(model)? {
             let path = PathBuf::from(format!("{} (built in)", built_in.name));
             let name = EnhancerName::new(built_in.name)?;
             let bytes = built_in.model.to_vec();
             let file = Self::from_bytes(path, name, None, bytes, built_in.sidecar)?;
             return Ok(Self {
-                named: model.to_owned(),
+                argument: model.to_owned(),
                 ..file
             });
         }
         let (preset, path) = Preset::split(model)?;
         let bytes = read_model(&path)?;
         if let Some(preset) = &preset
-            && let Some(other) = preset.named_after(&path)
+            && let Some(other) = preset.other_preset_in_name(&path)
         {
             tracing::warn!(
                 "{} is named like a model of preset {other}, but run with preset {}",
@@ -65,14 +65,14 @@ impl ModelFile {
             );
         }
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-        let name = name_of(&stem)?;
+        let name = enhancer_name(&stem)?;
         if name.as_str() != stem {
             tracing::warn!("{} is named {name} in tables and records", path.display());
         }
         let text = sidecar::text_for(&path)?;
         let file = Self::from_bytes(path, name, preset, bytes, &text)?;
         Ok(Self {
-            named: model.to_owned(),
+            argument: model.to_owned(),
             ..file
         })
     }
@@ -89,7 +89,7 @@ impl ModelFile {
         let sidecar = ModelSidecar::parse(&path, sidecar)?;
         Ok(Self {
             digest: digest(&path, &bytes, &sidecar, &weights, preset.as_ref())?,
-            named: path.clone(),
+            argument: path.clone(),
             path,
             name,
             sidecar,
@@ -111,14 +111,13 @@ impl ModelFile {
     /// Training data of the model; `None` if neither sidecar nor preset states it.
     #[must_use]
     pub fn trained_on(&self) -> Option<&str> {
-        let by_preset = self
-            .preset
-            .as_ref()
-            .and_then(|preset| preset.content.sidecar.trained_on.as_deref());
-        self.sidecar.trained_on.as_deref().or(by_preset)
+        self.sidecar.trained_on.as_deref().or_else(|| {
+            let preset = self.preset.as_ref()?;
+            preset.content.sidecar.trained_on.as_deref()
+        })
     }
 
-    /// The model with the index of the output to read. An output that the sidecar states takes precedence. The digest does not change.
+    /// Sets the index of the output to read, unless the sidecar states an output. The digest does not change.
     #[must_use]
     pub fn with_output(mut self, index: usize) -> Self {
         let stated = &mut self.sidecar.output;
@@ -139,12 +138,12 @@ impl ModelFile {
 
     /// Digest of everything that affects opening and probing the model.
     ///
-    /// Unlike [`digest`](Self::digest), it depends on whether a value comes from the sidecar or from the preset, although the enhanced
-    /// images are the same.
+    /// Unlike [`digest`](Self::digest), it depends on whether a value comes from the sidecar or from the preset, which changes the
+    /// described convention but not the images.
     ///
     /// # Errors
     /// If a number of the sidecar is infinite or NaN.
-    pub fn stated(&self) -> Result<Digest> {
+    pub fn probe_digest(&self) -> Result<Digest> {
         let preset = self.preset.as_ref().map(|preset| &preset.name);
         let facts = (self.digest, &self.sidecar, preset);
         Digest::canonical("darkqa.enhancer-stated/1", &facts)
@@ -160,34 +159,37 @@ impl ModelFile {
 /// Name of an enhancer whose file has this stem. Each run of characters other than ASCII letters, digits, `_`, `-` and `.` becomes `-`.
 ///
 /// A stem that is not ASCII gets a suffix, the first 6 hexadecimal digits of its digest, because such stems often differ only in the
-/// characters replaced.
-fn name_of(stem: &str) -> Result<EnhancerName> {
-    let is_allowed = |c: char| c.is_ascii_alphanumeric() || "_-.".contains(c);
-    if stem.chars().all(is_allowed) {
+/// replaced characters.
+fn enhancer_name(stem: &str) -> Result<EnhancerName> {
+    if stem.chars().all(is_allowed_in_name) {
         return EnhancerName::new(stem);
     }
     let mut name = stem
-        .split(|c: char| !is_allowed(c))
+        .split(|c: char| !is_allowed_in_name(c))
         .filter(|word| !word.is_empty())
         .collect::<Vec<_>>()
         .join("-");
     if !stem.is_ascii() {
-        let digest: String = Digest::from_bytes(stem.as_bytes()).to_string();
-        let digest = digest.rsplit(':').next().unwrap_or_default();
-        let digest: String = digest.chars().take(6).collect();
-        name = [name, digest].join("-");
+        let digest = Digest::from_bytes(stem.as_bytes()).to_string();
+        let digits = digest.rsplit(':').next().unwrap_or_default();
+        let suffix: String = digits.chars().take(6).collect();
+        name = [name, suffix].join("-");
     }
     EnhancerName::new(name.trim_matches('-'))
 }
 
-/// Content of an enhancer's digest: everything that determines an enhanced image, except the input image.
+fn is_allowed_in_name(c: char) -> bool {
+    c.is_ascii_alphanumeric() || "_-.".contains(c)
+}
+
+/// Input of an enhancer's digest: everything that determines an enhanced image, except the image before enhancement.
 #[derive(Serialize)]
 struct EnhancementFacts<'a> {
     file: Digest,
-    /// Digests of external data, by the location in the model.
+    /// Digests of the files of external data, by the `location` stated in the model.
     external: BTreeMap<&'a str, Digest>,
     convention: ModelSidecar,
-    /// The preset's rules for choosing an output, if they apply.
+    /// Rules of the preset for choosing an output, if they apply.
     outputs: Option<PresetOutputs<'a>>,
 }
 
@@ -228,16 +230,8 @@ fn digest(
 
 /// Number of outputs of a model: field 12 of its `GraphProto`, which is field 7 of the `ModelProto` (`onnx/onnx.proto`).
 fn output_count(model: &[u8]) -> usize {
-    let messages = |range: Range<usize>, wanted: u64| {
-        fields(model, range)
-            .filter_map(Result::ok)
-            .filter_map(move |field| match field {
-                (number, FieldValue::Bytes(bytes)) if number == wanted => Some(bytes),
-                _ => None,
-            })
-    };
-    messages(0..model.len(), 7)
-        .map(|graph| messages(graph, 12).count())
+    byte_fields(model, 0..model.len(), 7)
+        .map(|graph| byte_fields(model, graph, 12).count())
         .sum()
 }
 
@@ -247,10 +241,10 @@ fn output_count(model: &[u8]) -> usize {
 /// If the file is not in the model's folder or a subfolder. ONNX Runtime refuses such files too.
 fn external_path(model: &Path, location: &str) -> Result<PathBuf> {
     let relative = Path::new(location);
-    let inside = relative
+    let is_inside = relative
         .components()
         .all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
-    if !inside || location.is_empty() {
+    if !is_inside || location.is_empty() {
         return Err(Error::Enhancer {
             path: model.to_owned(),
             problem: format!(
@@ -266,27 +260,23 @@ fn external_path(model: &Path, location: &str) -> Result<PathBuf> {
 /// # Errors
 /// If the file is missing, shorter than `min_size` bytes, or cannot be read.
 fn read_weights(model: &Path, file: &Path, min_size: u64) -> Result<Vec<u8>> {
-    let fault = |problem: String| Error::Enhancer {
-        path: model.to_owned(),
-        problem,
-    };
-    let size = match std::fs::metadata(file) {
-        Ok(data) => data.len(),
-        Err(e) if e.kind() == ErrorKind::NotFound => {
-            return Err(fault(format!(
-                "its weights are missing: {}; copy this file to the same folder, or export the model as one file (external_data=False)",
-                file.display()
-            )));
-        }
+    let problem = match std::fs::metadata(file) {
+        Ok(data) if data.len() >= min_size => return reading::at_most(file, MAX_WEIGHTS_BYTES),
+        Ok(data) => format!(
+            "its weights are incomplete: {} has {} of {min_size} bytes; copy or download it again",
+            file.display(),
+            data.len()
+        ),
+        Err(e) if e.kind() == ErrorKind::NotFound => format!(
+            "its weights are missing: {}; copy this file to the same folder, or export the model as one file (external_data=False)",
+            file.display()
+        ),
         Err(e) => return Err(Error::file(file, "read", e)),
     };
-    if size < min_size {
-        return Err(fault(format!(
-            "its weights are incomplete: {} has {size} of {min_size} bytes; copy or download it again",
-            file.display()
-        )));
-    }
-    reading::at_most(file, MAX_WEIGHTS_BYTES)
+    Err(Error::Enhancer {
+        path: model.to_owned(),
+        problem,
+    })
 }
 
 /// Maximum size of a file of external data, in bytes (chosen): 100 times the largest published enhancers.
@@ -337,37 +327,38 @@ fn not_onnx(path: &Path, bytes: &[u8]) -> Error {
 mod tests {
     use super::*;
 
+    /// Protobuf field with fewer than 128 bytes of content.
+    fn field(number: u8, content: &[u8]) -> Vec<u8> {
+        [&[number << 3 | 2, content.len() as u8], content].concat()
+    }
+
     /// ONNX model with `ir_version = 8` and one initialiser, whose external data is in `location`.
     fn model(location: &str) -> Vec<u8> {
-        let field = |number: u8, content: &[u8]| {
-            [&[number << 3 | 2, content.len() as u8], content].concat()
-        };
         let entry = [field(1, b"location"), field(2, location.as_bytes())].concat();
         let tensor = [&[16, 1, 14 << 3, 1], field(13, &entry).as_slice()].concat();
         [&[8, 8], field(7, &field(5, &tensor)).as_slice()].concat()
     }
 
+    /// Digest of the model `a.onnx` in a folder, after writing its sidecar.
+    fn digest_with_sidecar(folder: &Path, sidecar: &str) -> Digest {
+        std::fs::write(folder.join("a.onnx.toml"), sidecar).unwrap();
+        ModelFile::read(&folder.join("a.onnx")).unwrap().digest()
+    }
+
     #[test]
-    fn the_digest_changes_with_every_part() {
+    fn digest_changes_with_every_file() {
         let folder = tempfile::tempdir().unwrap();
-        let write = |name: &str, content: &[u8]| {
-            std::fs::write(folder.path().join(name), content).unwrap();
-        };
-        let digest = || {
-            ModelFile::read(&folder.path().join("a.onnx"))
-                .unwrap()
-                .digest()
-        };
-        write("a.onnx", &model("a.bin"));
-        write("a.bin", &[1]);
-        let first = digest();
-        assert_eq!(first, digest());
-        write("a.bin", &[2]);
-        let second = digest();
-        write("a.onnx.toml", b"output = 0");
-        let third = digest();
-        write("a.onnx", &model("./a.bin"));
-        let all = [first, second, third, digest()];
+        let folder = folder.path();
+        std::fs::write(folder.join("a.onnx"), model("a.bin")).unwrap();
+        std::fs::write(folder.join("a.bin"), [1]).unwrap();
+        let first = digest_with_sidecar(folder, "");
+        assert_eq!(first, digest_with_sidecar(folder, ""));
+        std::fs::write(folder.join("a.bin"), [2]).unwrap();
+        let other_weights = digest_with_sidecar(folder, "");
+        let other_sidecar = digest_with_sidecar(folder, "output = 0");
+        std::fs::write(folder.join("a.onnx"), model("./a.bin")).unwrap();
+        let other_model = digest_with_sidecar(folder, "output = 0");
+        let all = [first, other_weights, other_sidecar, other_model];
         for (i, digest) in all.iter().enumerate() {
             assert!(!all[..i].contains(digest), "{i}");
         }
@@ -376,14 +367,10 @@ mod tests {
     #[test]
     fn stating_a_default_does_not_change_the_digest() {
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.onnx");
-        std::fs::write(&path, model("a.bin")).unwrap();
-        std::fs::write(folder.path().join("a.bin"), [1]).unwrap();
-        let digest = |sidecar: &str| {
-            std::fs::write(folder.path().join("a.onnx.toml"), sidecar).unwrap();
-            ModelFile::read(&path).unwrap().digest()
-        };
-        let bare = digest("");
+        let folder = folder.path();
+        std::fs::write(folder.join("a.onnx"), model("a.bin")).unwrap();
+        std::fs::write(folder.join("a.bin"), [1]).unwrap();
+        let bare = digest_with_sidecar(folder, "");
         for same in [
             "# a remark",
             "color = \"rgb\"\npad = \"reflect\"\nrounding = \"round\"",
@@ -391,10 +378,10 @@ mod tests {
             "trained_on = \"LOL-v1\"",
             "[extra]",
         ] {
-            assert_eq!(digest(same), bare, "{same}");
+            assert_eq!(digest_with_sidecar(folder, same), bare, "{same}");
         }
         for other in ["color = \"bgr\"", "mean = [0.1, 0, 0]", "[extra]\na = 0"] {
-            assert_ne!(digest(other), bare, "{other}");
+            assert_ne!(digest_with_sidecar(folder, other), bare, "{other}");
         }
     }
 
@@ -402,11 +389,11 @@ mod tests {
     #[test]
     fn digest_covers_only_stated_keys() {
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.onnx");
         let file = model("a.bin");
-        std::fs::write(&path, &file).unwrap();
+        std::fs::write(folder.path().join("a.onnx"), &file).unwrap();
         std::fs::write(folder.path().join("a.bin"), [1]).unwrap();
-        let hash = |bytes: &[u8]| serde_json::to_string(&Digest::from_bytes(bytes)).unwrap();
+        let [weights_digest, file_digest] = [&[1][..], &file]
+            .map(|bytes| serde_json::to_string(&Digest::from_bytes(bytes)).unwrap());
         for (sidecar, convention) in [
             ("", ""),
             (
@@ -422,36 +409,31 @@ mod tests {
                 r#""extra":{"r":{"map":5.0}},"image":"L ^ 0.2 * R""#,
             ),
         ] {
-            std::fs::write(folder.path().join("a.onnx.toml"), sidecar).unwrap();
             let facts = format!(
-                r#"darkqa.enhancer/2{}{{"convention":{{{convention}}},"external":{{"a.bin":{}}},"file":{}}}"#,
-                '\0',
-                hash(&[1]),
-                hash(&file)
+                r#"darkqa.enhancer/2{}{{"convention":{{{convention}}},"external":{{"a.bin":{weights_digest}}},"file":{file_digest}}}"#,
+                '\0'
             );
-            let found = ModelFile::read(&path).unwrap().digest();
+            let found = digest_with_sidecar(folder.path(), sidecar);
             assert_eq!(found, Digest::from_bytes(facts.as_bytes()), "{sidecar}");
         }
     }
 
     #[test]
     fn file_stems_become_enhancer_names() {
-        let name = |stem: &str| name_of(stem).unwrap().to_string();
-        assert_eq!(name("zero-dce_v1.2"), "zero-dce_v1.2");
-        assert_eq!(name("zero dce (1)"), "zero-dce-1");
-        let [one, other] = ["低光", "增强"].map(name);
+        let [plain, spaced, one, other, mixed] =
+            ["zero-dce_v1.2", "zero dce (1)", "低光", "增强", "模型 v2"]
+                .map(|stem| enhancer_name(stem).unwrap().to_string());
+        assert_eq!(plain, "zero-dce_v1.2");
+        assert_eq!(spaced, "zero-dce-1");
         assert!(
             one.len() == 6 && other.len() == 6 && one != other,
             "{one} {other}"
         );
-        assert!(name("模型 v2").starts_with("v2-"));
+        assert!(mixed.starts_with("v2-"));
     }
 
     #[test]
     fn outputs_are_counted() {
-        let field = |number: u8, content: &[u8]| {
-            [&[number << 3 | 2, content.len() as u8], content].concat()
-        };
         let graph = [field(12, b""), field(11, b""), field(12, b"")].concat();
         assert_eq!(output_count(&field(7, &graph)), 2);
         assert_eq!(output_count(&model("a.bin")), 0);
@@ -477,7 +459,7 @@ mod tests {
             let message = ModelFile::read(&path).unwrap_err().to_string();
             assert!(message.contains(part), "{message}");
         }
-        // A sparse file: too large, without any data.
+        // A sparse file is too large although it has no data.
         let large = folder.path().join("large.onnx");
         let file = std::fs::File::create(&large).unwrap();
         file.set_len(MAX_MODEL_BYTES + 1).unwrap();

@@ -1,13 +1,13 @@
-//! Files of models: their protobuf messages, weights and operators, read without a runtime.
+//! ONNX files of models, read without ONNX Runtime: protobuf messages, weights and operators.
 
 mod built_in;
 mod file;
-mod frozen;
 mod onnx_message;
 mod protobuf;
 mod random_operators;
+mod traced_sizes;
 mod weights;
 
 pub use file::ModelFile;
-pub(super) use frozen::traced_sizes;
 pub(super) use random_operators::RandomOperators;
+pub(super) use traced_sizes::traced_sizes;

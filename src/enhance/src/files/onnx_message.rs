@@ -1,6 +1,6 @@
-//! The messages of an ONNX file that lead to nodes and weights: [`OnnxMessage`].
+//! Protobuf messages of an ONNX file that contain nodes or weights: [`OnnxMessage`].
 
-/// A message of `onnx.proto` that has nodes or weights in it.
+/// Type of a message of `onnx.proto` that can contain nodes or weights.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum OnnxMessage {
     Model,
@@ -13,8 +13,8 @@ pub(super) enum OnnxMessage {
 }
 
 impl OnnxMessage {
-    /// The message in a field; `None` if it has neither nodes nor weights.
-    pub(super) fn in_field(self, number: u64) -> Option<Self> {
+    /// Type of the message in the field with this number; `None` if it can contain neither nodes nor weights.
+    pub(super) fn child(self, number: u64) -> Option<Self> {
         match (self, number) {
             (Self::Model, 7) | (Self::Attribute, 6 | 11) => Some(Self::Graph),
             (Self::Model, 25) => Some(Self::Function),
@@ -28,9 +28,9 @@ impl OnnxMessage {
         }
     }
 
-    /// The message in a field if it has nodes in it.
-    pub(super) fn with_nodes(self, number: u64) -> Option<Self> {
-        let inner = self.in_field(number);
-        inner.filter(|inner| !matches!(inner, Self::SparseTensor | Self::Tensor))
+    /// Type of the message in the field with this number; `None` if it cannot contain nodes.
+    pub(super) fn child_with_nodes(self, number: u64) -> Option<Self> {
+        self.child(number)
+            .filter(|child| !matches!(child, Self::SparseTensor | Self::Tensor))
     }
 }

@@ -1,40 +1,54 @@
-//! Fields of a protobuf message by number and byte position, without a schema: [`fields`].
+//! Schema-free decoding of the fields of a protobuf message: [`fields`].
 //!
-//! The encoding is that of <https://protobuf.dev/programming-guides/encoding/>. Groups, which ONNX never used, are refused.
+//! The encoding is specified in <https://protobuf.dev/programming-guides/encoding/>. Groups, which ONNX never used, are refused.
 
 use std::ops::Range;
 
-/// The error for bytes that are not a protobuf message.
+/// Error for bytes that are not a protobuf message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Malformed;
 
-/// Value of a field; ranges are byte positions in the whole buffer.
+/// Value of a field. Ranges are byte positions in the whole buffer.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum FieldValue {
     Varint(u64),
     Fixed32(Range<usize>),
     Fixed64(Range<usize>),
-    /// A string, some bytes, a message or packed numbers.
+    /// A length-delimited value: a string, bytes, a message or packed numbers.
     Bytes(Range<usize>),
 }
 
-/// Iterator over the fields of the message at `within` in `buffer`; it ends after the first error.
-pub(super) fn fields(buffer: &[u8], within: Range<usize>) -> FieldsOf<'_> {
+/// Iterates over the fields of the message at the position `within` of `buffer`, as pairs of field number and value. Ends after the first
+/// error.
+pub(super) fn fields(buffer: &[u8], within: Range<usize>) -> Fields<'_> {
     let message = buffer.get(..within.end).unwrap_or_default();
-    FieldsOf {
+    Fields {
         message,
         at: within.start,
     }
 }
 
-pub(super) struct FieldsOf<'a> {
+/// Iterates over the contents of the length-delimited fields with number `wanted`, up to the first malformed field.
+pub(super) fn byte_fields(
+    buffer: &[u8],
+    within: Range<usize>,
+    wanted: u64,
+) -> impl Iterator<Item = Range<usize>> {
+    fields(buffer, within).filter_map(move |field| match field {
+        Ok((number, FieldValue::Bytes(bytes))) if number == wanted => Some(bytes),
+        _ => None,
+    })
+}
+
+/// Iterator returned by [`fields`].
+pub(super) struct Fields<'a> {
     /// The buffer up to the end of the message.
     message: &'a [u8],
     /// Position of the next field.
     at: usize,
 }
 
-impl Iterator for FieldsOf<'_> {
+impl Iterator for Fields<'_> {
     type Item = Result<(u64, FieldValue), Malformed>;
 
     fn next(&mut self) -> Option<Self::Item> {
@@ -49,7 +63,7 @@ impl Iterator for FieldsOf<'_> {
     }
 }
 
-impl FieldsOf<'_> {
+impl Fields<'_> {
     /// Position of the next field in the buffer.
     pub(super) fn position(&self) -> usize {
         self.at
@@ -102,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn fields_of_every_type_are_read() {
+    fn fields_of_every_type_are_decoded() {
         let bytes = [
             8, 0x96, 1, // field 1: 150
             0x12, 2, b'h', b'i', // field 2: "hi"
@@ -119,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn broken_fields_end_the_reading() {
+    fn malformed_fields_end_the_iteration() {
         let cases: [&[u8]; 7] = [
             &[8],                                                      // no value
             &[0x12, 3, 0, 0],                                          // two bytes of three

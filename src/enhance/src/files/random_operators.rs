@@ -8,7 +8,7 @@ use std::ops::Range;
 use super::onnx_message::OnnxMessage;
 use super::protobuf::{FieldValue, Malformed, fields};
 
-/// Operators whose attribute `seed` is a float.
+/// Random operators, whose attribute `seed` is a float.
 const SEEDED_BY_FLOAT: [&str; 6] = [
     "RandomNormal",
     "RandomNormalLike",
@@ -18,29 +18,31 @@ const SEEDED_BY_FLOAT: [&str; 6] = [
     "Bernoulli",
 ];
 
-/// Deepest nesting of graphs in nodes in which a seed is set; chosen.
-const DEEPEST: usize = 60;
+/// Maximum depth of nested messages in which seeds are set; chosen.
+const MAX_DEPTH: usize = 60;
 
 /// The random operators of a model.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct RandomOperators {
-    /// Names of the operators, as `RandomNormalLike`.
+    /// Names of the operators, such as `RandomNormalLike`.
     pub(crate) names: BTreeSet<String>,
     /// Byte ranges of the nodes without a seed.
     unseeded: BTreeSet<(usize, usize)>,
 }
 
-/// One node: its operator, its inputs, its outputs and whether it has the attribute `seed`.
+/// Properties of a `NodeProto` that show whether it is random.
 struct Node {
     operator: String,
     inputs: Vec<String>,
     outputs: Vec<String>,
+    /// True if the node has the attribute `seed`.
     has_seed: bool,
+    /// Value of a boolean `Constant`; `None` for other nodes.
     constant: Option<bool>,
 }
 
 impl RandomOperators {
-    /// Finds them in a `ModelProto`: in its graph, subgraphs and functions. A dropout counts if it may be in training mode.
+    /// Finds the random operators of a `ModelProto`, in its graph, subgraphs and functions. A dropout counts if it may be in training mode.
     ///
     /// # Errors
     /// If the bytes are not a protobuf message.
@@ -49,8 +51,8 @@ impl RandomOperators {
         let mut nodes: Vec<(Range<usize>, Node)> = Vec::new();
         let mut constants: BTreeMap<String, bool> = BTreeMap::new();
         // A stack instead of recursion, so that deep nesting cannot overflow the call stack.
-        let mut open = vec![(OnnxMessage::Model, 0..model.len())];
-        while let Some((message, range)) = open.pop() {
+        let mut stack = vec![(OnnxMessage::Model, 0..model.len())];
+        while let Some((message, range)) = stack.pop() {
             if message == OnnxMessage::Node {
                 nodes.push((range.clone(), Node::read(model, range.clone())?));
             }
@@ -62,18 +64,15 @@ impl RandomOperators {
                     let (name, value) = truth_value(model, bytes.clone())?;
                     constants.extend(value.map(|value| (name, value)));
                 }
-                if let Some(inner) = message.with_nodes(number) {
-                    open.push((inner, bytes));
+                if let Some(child) = message.child_with_nodes(number) {
+                    stack.push((child, bytes));
                 }
             }
         }
         for (_, node) in &nodes {
-            let outputs = node.outputs.iter();
-            constants.extend(
-                node.constant
-                    .iter()
-                    .flat_map(|value| outputs.clone().map(|output| (output.clone(), *value))),
-            );
+            if let Some(value) = node.constant {
+                constants.extend(node.outputs.iter().map(|output| (output.clone(), value)));
+            }
         }
         for (range, node) in nodes {
             let is_random = SEEDED_BY_FLOAT.contains(&node.operator.as_str())
@@ -88,17 +87,17 @@ impl RandomOperators {
         Ok(found)
     }
 
-    /// The model with a seed at each random operator that has none; the same bytes if all have one.
-    pub(crate) fn seeded(&self, model: Vec<u8>) -> Vec<u8> {
+    /// The model with a seed added to each random operator that lacks one.
+    pub(crate) fn with_seeds(&self, model: Vec<u8>) -> Vec<u8> {
         if self.unseeded.is_empty() {
             return model;
         }
-        self.copied(&model, OnnxMessage::Model, 0..model.len(), 0)
+        self.copy_with_seeds(&model, OnnxMessage::Model, 0..model.len(), 0)
             .unwrap_or(model)
     }
 
-    /// A message with the seeds of its nodes.
-    fn copied(
+    /// Copies the message at `range`, adding seeds to its nodes; `None` if the message is malformed.
+    fn copy_with_seeds(
         &self,
         model: &[u8],
         message: OnnxMessage,
@@ -106,11 +105,12 @@ impl RandomOperators {
         depth: usize,
     ) -> Option<Vec<u8>> {
         let is_unseeded = self.unseeded.contains(&(range.start, range.end));
-        let touched = |range: &Range<usize>| {
-            let mut from = self.unseeded.range((range.start, 0)..);
-            from.next().is_some_and(|(start, _)| *start < range.end)
-        };
-        if depth > DEEPEST || !touched(&range) {
+        let contains_unseeded = self
+            .unseeded
+            .range((range.start, 0)..)
+            .next()
+            .is_some_and(|(start, _)| *start < range.end);
+        if depth > MAX_DEPTH || !contains_unseeded {
             return Some(model.get(range)?.to_vec());
         }
         let mut copy = Vec::with_capacity(range.len() + 32);
@@ -119,10 +119,12 @@ impl RandomOperators {
         while let Some(field) = all.next() {
             let end = all.position();
             match field.ok()? {
-                (number, FieldValue::Bytes(bytes)) if message.with_nodes(number).is_some() => {
-                    let inner = message.with_nodes(number)?;
-                    let inner = self.copied(model, inner, bytes, depth + 1)?;
-                    push_bytes(&mut copy, number, &inner);
+                (number, FieldValue::Bytes(bytes))
+                    if message.child_with_nodes(number).is_some() =>
+                {
+                    let child = message.child_with_nodes(number)?;
+                    let child = self.copy_with_seeds(model, child, bytes, depth + 1)?;
+                    push_bytes(&mut copy, number, &child);
                 }
                 _ => copy.extend(model.get(start..end)?),
             }
@@ -138,9 +140,6 @@ impl RandomOperators {
 
 impl Node {
     fn read(model: &[u8], range: Range<usize>) -> Result<Self, Malformed> {
-        let text = |bytes: Range<usize>| {
-            String::from_utf8_lossy(model.get(bytes).unwrap_or_default()).into_owned()
-        };
         let mut node = Self {
             operator: String::new(),
             inputs: Vec::new(),
@@ -151,9 +150,9 @@ impl Node {
         let mut attributes = Vec::new();
         for field in fields(model, range) {
             match field? {
-                (1, FieldValue::Bytes(bytes)) => node.inputs.push(text(bytes)),
-                (2, FieldValue::Bytes(bytes)) => node.outputs.push(text(bytes)),
-                (4, FieldValue::Bytes(bytes)) => node.operator = text(bytes),
+                (1, FieldValue::Bytes(bytes)) => node.inputs.push(text(model, bytes)),
+                (2, FieldValue::Bytes(bytes)) => node.outputs.push(text(model, bytes)),
+                (4, FieldValue::Bytes(bytes)) => node.operator = text(model, bytes),
                 (5, FieldValue::Bytes(bytes)) => attributes.push(bytes),
                 _ => {}
             }
@@ -161,7 +160,7 @@ impl Node {
         for attribute in attributes {
             for field in fields(model, attribute) {
                 match field? {
-                    (1, FieldValue::Bytes(bytes)) => node.has_seed |= text(bytes) == "seed",
+                    (1, FieldValue::Bytes(bytes)) => node.has_seed |= text(model, bytes) == "seed",
                     (5, FieldValue::Bytes(bytes)) if node.operator == "Constant" => {
                         node.constant = truth_value(model, bytes)?.1;
                     }
@@ -172,7 +171,7 @@ impl Node {
         Ok(node)
     }
 
-    /// Whether a dropout may be in training mode: its third input is not a constant that is false.
+    /// True if a dropout may be in training mode: it has a third input that is not the constant `false`.
     fn is_training(&self, constants: &BTreeMap<String, bool>) -> bool {
         self.inputs
             .get(2)
@@ -181,16 +180,19 @@ impl Node {
     }
 }
 
-/// Name of a `TensorProto`, and its truth value if it holds one.
+/// Text of a string field.
+fn text(model: &[u8], bytes: Range<usize>) -> String {
+    String::from_utf8_lossy(model.get(bytes).unwrap_or_default()).into_owned()
+}
+
+/// Name of a `TensorProto`, and its first element; `None` if it is not a tensor of booleans.
 fn truth_value(model: &[u8], range: Range<usize>) -> Result<(String, Option<bool>), Malformed> {
     const BOOL: u64 = 9;
     let (mut name, mut data_type, mut value) = (String::new(), 0, None);
     for field in fields(model, range) {
         match field? {
             (2, FieldValue::Varint(number)) => data_type = number,
-            (8, FieldValue::Bytes(bytes)) => {
-                name = String::from_utf8_lossy(model.get(bytes).unwrap_or_default()).into_owned();
-            }
+            (8, FieldValue::Bytes(bytes)) => name = text(model, bytes),
             // int32_data, packed or not; raw_data
             (5, FieldValue::Varint(number)) => value = Some(number != 0),
             (5 | 9, FieldValue::Bytes(bytes)) => {
@@ -204,7 +206,7 @@ fn truth_value(model: &[u8], range: Range<usize>) -> Result<(String, Option<bool
     Ok((name, value.filter(|_| data_type == BOOL)))
 }
 
-/// The attribute `seed` of an operator, with a value that no default has.
+/// Encoded attribute `seed` of an operator, with the value 1, which no exporter writes by default.
 fn seed_attribute(operator: &str) -> Vec<u8> {
     const FLOAT: u8 = 1;
     const INT: u8 = 2;
@@ -222,7 +224,7 @@ fn seed_attribute(operator: &str) -> Vec<u8> {
     attribute
 }
 
-/// Appends a field of bytes.
+/// Appends a length-delimited field.
 fn push_bytes(message: &mut Vec<u8>, number: u64, bytes: &[u8]) {
     push_varint(message, number << 3 | 2);
     push_varint(message, bytes.len() as u64);
@@ -257,7 +259,8 @@ mod tests {
         field(1, &node)
     }
 
-    fn flag(value: u8) -> Vec<u8> {
+    /// Initialiser named `mode`, a boolean.
+    fn mode_initialiser(value: u8) -> Vec<u8> {
         let tensor = [&[2 << 3, 9][..], &field(8, b"mode"), &field(9, &[value])].concat();
         field(5, &tensor)
     }
@@ -282,24 +285,27 @@ mod tests {
     }
 
     #[test]
-    fn a_dropout_is_random_only_in_training_mode() {
+    fn dropout_is_random_only_in_training_mode() {
         let dropout = node("Dropout", &["x", "ratio", "mode"]);
-        assert_eq!(names(&[dropout.clone(), flag(1)].concat()), ["Dropout"]);
-        assert!(names(&[dropout, flag(0)].concat()).is_empty());
+        assert_eq!(
+            names(&[dropout.clone(), mode_initialiser(1)].concat()),
+            ["Dropout"]
+        );
+        assert!(names(&[dropout, mode_initialiser(0)].concat()).is_empty());
         assert!(names(&node("Dropout", &["x"])).is_empty());
     }
 
     #[test]
-    fn a_seed_is_set_where_none_is() {
+    fn missing_seeds_are_added() {
         let model = field(
             7,
             &[node("Relu", &["x"]), node("RandomUniform", &[])].concat(),
         );
         let found = RandomOperators::find(&model).unwrap();
-        let seeded = found.seeded(model.clone());
+        let seeded = found.with_seeds(model.clone());
         assert!(seeded.windows(4).any(|word| word == b"seed"));
         let again = RandomOperators::find(&seeded).unwrap();
         assert!(again.unseeded.is_empty() && again.names == found.names);
-        assert_eq!(again.seeded(seeded.clone()), seeded);
+        assert_eq!(again.with_seeds(seeded.clone()), seeded);
     }
 }

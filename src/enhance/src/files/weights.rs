@@ -1,11 +1,10 @@
-//! Weights in the bytes of an ONNX model: [`Weights::find`], [`Weights::flush_subnormals`].
+//! Weights of an ONNX model, and the flushing of subnormal ones to zero: [`Weights`].
 //!
-//! Training with weight decay leaves subnormal weights, below 2⁻¹²⁶. They do not affect the image, but cost some processors
-//! a hundred cycles each. A quarter of Zero-DCE's published weights is subnormal: with them it ran some 45 times slower on
-//! an Intel Xeon, and no slower on an AMD EPYC. ONNX Runtime's option (`session.set_denormal_as_zero`) reaches a calling
-//! thread only through the first session of a process. So the weights are set to zero before a session is created; the
-//! images of Zero-DCE do not change by one byte.
-//! Weights in files beside the model are not changed: those models are loaded by path, and only the option acts on them.
+//! Training with weight decay leaves subnormal weights, below 2⁻¹²⁶. They do not affect the image, but cost some processors a hundred
+//! cycles per operation. A quarter of Zero-DCE's published weights is subnormal: they made it about 45 times slower on an Intel Xeon, and
+//! no slower on an AMD EPYC. ONNX Runtime's option `session.set_denormal_as_zero` takes effect only in the thread that creates the first
+//! session of a process. So the weights themselves are set to zero before a session is created; the images of Zero-DCE stay the same,
+//! byte for byte. Weights in external files are not changed, because such models are loaded by path; for them, only the option applies.
 //!
 //! Field numbers are those of `onnx/onnx.proto` (IR version 13).
 
@@ -15,12 +14,12 @@ use std::ops::Range;
 use super::onnx_message::OnnxMessage;
 use super::protobuf::{FieldValue, Malformed, fields};
 
-/// Positions of the 32-bit floats in a model, and names of other files with weights.
+/// Positions of the 32-bit floats in a model, and its files of external data.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub(crate) struct Weights {
     /// Byte ranges of little-endian 32-bit floats.
     floats: Vec<Range<usize>>,
-    /// The `location` of every tensor with external data, relative to the model's folder, and the least size of that file in bytes.
+    /// Files of external data: their `location`, relative to the model's folder, and their minimum size in bytes.
     pub(crate) external: BTreeMap<String, u64>,
 }
 
@@ -28,13 +27,13 @@ impl Weights {
     /// Finds the weights of a `ModelProto`: in its graph, subgraphs, functions and constants.
     ///
     /// # Errors
-    /// If the bytes are not a protobuf message, or one without a graph.
+    /// If the bytes are not a protobuf message, or have no graph.
     pub(super) fn find(model: &[u8]) -> Result<Self, Malformed> {
         let mut weights = Self::default();
         let mut has_graph = false;
         // A stack instead of recursion, so that deep nesting cannot overflow the call stack.
-        let mut open = vec![(OnnxMessage::Model, 0..model.len())];
-        while let Some((message, range)) = open.pop() {
+        let mut stack = vec![(OnnxMessage::Model, 0..model.len())];
+        while let Some((message, range)) = stack.pop() {
             if let OnnxMessage::Tensor = message {
                 weights.add_tensor(model, range)?;
                 continue;
@@ -42,9 +41,9 @@ impl Weights {
             has_graph |= matches!(message, OnnxMessage::Graph);
             for field in fields(model, range) {
                 if let (number, FieldValue::Bytes(bytes)) = field?
-                    && let Some(inner) = message.in_field(number)
+                    && let Some(child) = message.child(number)
                 {
-                    open.push((inner, bytes));
+                    stack.push((child, bytes));
                 }
             }
         }
@@ -55,7 +54,7 @@ impl Weights {
         }
     }
 
-    /// Adds the positions of the floats of one `TensorProto`, or the name of its external file.
+    /// Adds the positions of the floats of a `TensorProto`, or its file of external data.
     fn add_tensor(&mut self, model: &[u8], range: Range<usize>) -> Result<(), Malformed> {
         const FLOAT: u64 = 1;
         const EXTERNAL: u64 = 1;
@@ -69,14 +68,18 @@ impl Weights {
                 (4 | 9, FieldValue::Bytes(bytes)) | (4, FieldValue::Fixed32(bytes)) => {
                     floats.push(bytes);
                 }
-                (13, FieldValue::Bytes(entry)) => entries.extend(entry_in(model, entry)?),
+                (13, FieldValue::Bytes(entry)) => entries.extend(read_entry(model, entry)?),
                 _ => {}
             }
         }
         if location == EXTERNAL {
-            let number = |key: &str| entries.get(key).and_then(|text: &String| text.parse().ok());
-            let end = number("offset").unwrap_or(0_u64);
-            let end = end.saturating_add(number("length").unwrap_or(0));
+            let [offset, length] = ["offset", "length"].map(|key| {
+                entries
+                    .get(key)
+                    .and_then(|text: &String| text.parse().ok())
+                    .unwrap_or(0_u64)
+            });
+            let end = offset.saturating_add(length);
             if let Some(location) = entries.get("location") {
                 let size = self.external.entry(location.clone()).or_default();
                 *size = end.max(*size);
@@ -87,7 +90,7 @@ impl Weights {
         Ok(())
     }
 
-    /// Sets every subnormal float of `model` to zero with the same sign; returns their number.
+    /// Sets every subnormal float of `model` to zero, keeping its sign; returns the number of changed floats.
     ///
     /// `model` must be the buffer that was passed to [`Weights::find`].
     pub(crate) fn flush_subnormals(&self, model: &mut [u8]) -> usize {
@@ -107,8 +110,8 @@ impl Weights {
     }
 }
 
-/// Key and value of a `StringStringEntryProto`, if it has both.
-fn entry_in(model: &[u8], entry: Range<usize>) -> Result<Option<(String, String)>, Malformed> {
+/// Key and value of a `StringStringEntryProto`; `None` if one is missing.
+fn read_entry(model: &[u8], entry: Range<usize>) -> Result<Option<(String, String)>, Malformed> {
     let (mut key, mut value) = (None, None);
     for field in fields(model, entry) {
         match field? {
@@ -117,10 +120,14 @@ fn entry_in(model: &[u8], entry: Range<usize>) -> Result<Option<(String, String)
             _ => {}
         }
     }
-    let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).map_err(|_| Malformed);
-    key.zip(value)
-        .map(|(key, value)| Ok((text(key)?, text(value)?)))
-        .transpose()
+    let (Some(key), Some(value)) = (key, value) else {
+        return Ok(None);
+    };
+    Ok(Some((decode_utf8(key)?, decode_utf8(value)?)))
+}
+
+fn decode_utf8(bytes: &[u8]) -> Result<String, Malformed> {
+    String::from_utf8(bytes.to_vec()).map_err(|_| Malformed)
 }
 
 #[cfg(test)]
@@ -137,20 +144,18 @@ mod tests {
         [&[number << 3 | 2, length], content].concat()
     }
 
-    fn raw(floats: &[f32]) -> Vec<u8> {
-        floats.iter().flat_map(|x| x.to_le_bytes()).collect()
-    }
-
-    /// A tensor of the given type with its data in one field.
+    /// A tensor of the given type with its data in the field `number`.
     fn tensor(data_type: u8, number: u8, floats: &[f32]) -> Vec<u8> {
-        [&[2 << 3, data_type], field(number, &raw(floats)).as_slice()].concat()
+        let bytes: Vec<u8> = floats.iter().flat_map(|x| x.to_le_bytes()).collect();
+        [&[2 << 3, data_type], field(number, &bytes).as_slice()].concat()
     }
 
     fn model(graph: &[u8]) -> Vec<u8> {
         [&[8, 8], field(7, graph).as_slice()].concat()
     }
 
-    fn flushed(mut bytes: Vec<u8>) -> (usize, Vec<u8>) {
+    /// Flushes the subnormal weights of a model; returns their number and the changed bytes.
+    fn flush(mut bytes: Vec<u8>) -> (usize, Vec<u8>) {
         let count = Weights::find(&bytes).unwrap().flush_subnormals(&mut bytes);
         (count, bytes)
     }
@@ -159,7 +164,7 @@ mod tests {
     fn raw_and_packed_weights_are_flushed_with_their_sign() {
         let weights = [1.0, SUBNORMAL, -SUBNORMAL, 0.5, f32::MIN_POSITIVE];
         for number in [4, 9] {
-            let (count, bytes) = flushed(model(&field(5, &tensor(1, number, &weights))));
+            let (count, bytes) = flush(model(&field(5, &tensor(1, number, &weights))));
             let zeroed = [1.0, 0.0, -0.0, 0.5, f32::MIN_POSITIVE];
             let expected = model(&field(5, &tensor(1, number, &zeroed)));
             assert_eq!((count, bytes), (2, expected));
@@ -167,32 +172,32 @@ mod tests {
     }
 
     #[test]
-    fn floats_one_by_one_are_flushed() {
+    fn unpacked_weights_are_flushed() {
         let tensor = [&[16, 1, 0x25], SUBNORMAL.to_le_bytes().as_slice()].concat();
-        let (count, bytes) = flushed(model(&field(5, &tensor)));
+        let (count, bytes) = flush(model(&field(5, &tensor)));
         assert_eq!(count, 1);
         assert!(bytes.ends_with(&[0; 4]));
     }
 
     #[test]
-    fn constants_and_subgraphs_are_reached() {
+    fn weights_in_constants_and_subgraphs_are_flushed() {
         let tensor = tensor(1, 9, &[SUBNORMAL]);
         let constant = field(1, &field(5, &field(5, &tensor)));
         let inside = field(1, &field(5, &field(6, &field(5, &tensor))));
         for graph in [constant, inside] {
-            assert_eq!(flushed(model(&graph)).0, 1);
+            assert_eq!(flush(model(&graph)).0, 1);
         }
     }
 
     #[test]
     fn other_types_keep_their_bytes() {
-        // 7 is int64: the same bytes mean something else there.
+        // The same bytes as int64 (data type 7).
         let bytes = model(&field(5, &tensor(7, 9, &[SUBNORMAL; 2])));
-        assert_eq!(flushed(bytes.clone()), (0, bytes));
+        assert_eq!(flush(bytes.clone()), (0, bytes));
     }
 
     #[test]
-    fn external_data_is_named_and_not_changed() {
+    fn external_data_is_listed_with_its_minimum_size() {
         let entry = [field(1, b"location"), field(2, b"weights.bin")].concat();
         let offset = [field(1, b"offset"), field(2, b"8")].concat();
         let length = [field(1, b"length"), field(2, b"12")].concat();
@@ -254,7 +259,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn arbitrary_bytes_do_not_make_it_panic(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
+        fn arbitrary_bytes_cause_no_panic(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
             let mut bytes = bytes;
             if let Ok(weights) = Weights::find(&bytes) {
                 weights.flush_subnormals(&mut bytes);
@@ -262,7 +267,7 @@ mod tests {
         }
 
         #[test]
-        fn a_damaged_model_does_not_make_it_panic(
+        fn damaged_models_cause_no_panic(
             cut in 0_usize..60,
             at in 0_usize..60,
             byte in any::<u8>(),

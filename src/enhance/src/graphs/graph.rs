@@ -8,18 +8,18 @@ use ort::session::Session;
 
 use super::port::Port;
 use super::session::{
-    GraphSource, SessionOptions, Stopper, builder, one_line, ports, run, take_batch,
+    GraphSource, SessionOptions, Stopper, one_line, ports, remove_batch, run, session_builder,
 };
 use crate::conventions::Signature;
 use crate::conventions::preset::Preset;
 use crate::conventions::sidecar::{ADD, ModelSidecar};
-use crate::failure::{RunFailure, load_problem};
-use crate::inputs::{DarkImage, FedImage, Feeding, Tensor};
-use crate::libraries::{Ended, JobLimits, Runtime};
+use crate::failure::{RunFailure, describe_load_failure};
+use crate::inputs::{DarkImage, FedImage, InputEncoding, Tensor};
+use crate::libraries::{JobEnd, JobLimits, Runtime};
 use crate::limits::{ImageClock, MemoryLimit, TimeLimit};
-use crate::outputs::{Composition, ImageTensor, OutOfRange};
+use crate::outputs::{Composition, ImageTensor, InvalidValues};
 use crate::planes::Planes;
-use crate::probes::Codes;
+use crate::probes::UnclampedImage;
 use crate::sizing::TileWindow;
 use darkqa_ground::error::Result;
 use darkqa_ground::types::Rgb;
@@ -27,29 +27,29 @@ use darkqa_ground::types::Rgb;
 /// A loaded graph with its session.
 pub(crate) struct Graph {
     pub(crate) signature: Arc<Signature>,
-    pub(crate) feeding: Feeding,
-    pub(crate) reading: Arc<Composition>,
-    /// Statements of sidecar and preset.
+    pub(crate) encoding: InputEncoding,
+    pub(crate) decoding: Arc<Composition>,
+    /// Convention stated by sidecar and preset.
     pub(crate) convention: ModelSidecar,
-    /// Differences between the graph and the model that the preset's authors published.
-    pub(crate) differing: Option<String>,
+    /// Message about differences between the graph and the model that the preset's authors published.
+    pub(crate) preset_differences: Option<String>,
     runtime: Runtime,
     session: Arc<Mutex<Session>>,
     options: Arc<SessionOptions>,
     ports: Arc<Ports>,
-    /// Options that give back memory after a run.
+    /// Options for runs after which ONNX Runtime releases its arena.
     releasing: Arc<SessionOptions>,
     clock: Mutex<ImageClock>,
-    /// Memory that the process may take during a run.
+    /// Limit of the process's memory during a run.
     memory: MemoryLimit,
 }
 
-/// Limits for loading a model, and then for each image. Loading is limited too, because ONNX Runtime folds constants then.
+/// Limits for loading a model, and then for each image. Loading can be slow because ONNX Runtime folds constants.
 #[derive(Debug, Clone, Copy)]
 pub struct LoadLimits {
-    /// The longest time.
+    /// Limit of the time.
     pub time: TimeLimit,
-    /// The memory of the process.
+    /// Limit of the process's memory.
     pub memory: MemoryLimit,
 }
 
@@ -61,15 +61,15 @@ impl LoadLimits {
     };
 }
 
-/// All inputs and outputs of a graph, by name, type and dimensions; those of its first image if it takes several.
+/// All inputs and outputs of a graph. For a graph with a fixed batch size, their batch dimension is set to 1.
 struct Ports {
     inputs: Vec<Port>,
     outputs: Vec<Port>,
-    /// Number of images of each run: 1, or the graph's fixed batch size.
+    /// The graph's fixed batch size, else 1.
     batch: usize,
 }
 
-/// Treatment at the end of a run of the arena, the memory that ONNX Runtime keeps for later runs.
+/// Treatment of the arena, the memory that ONNX Runtime reserves for later runs, at the end of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Arena {
     Kept,
@@ -78,19 +78,19 @@ pub(crate) enum Arena {
 
 /// Result of a run of a model.
 pub(crate) enum RunResult<T> {
-    /// Content read from the output.
+    /// Decoded output.
     Output(T),
-    /// It gave no image of this size.
+    /// The run failed, or its output is not an image of the input's size.
     Failed(RunFailure),
-    /// The values of the output are not those of an image.
-    Unusable(OutOfRange),
+    /// The values of the input or output are invalid.
+    Unusable(InvalidValues),
 }
 
 impl Graph {
-    /// Loads a model, with the statements of its sidecar and its preset.
+    /// Loads a model with the convention of its sidecar and preset.
     ///
     /// # Errors
-    /// The inner error describes the fault of the model, to follow the file's name.
+    /// The outer error is a failure of the runtime. The inner one is a message about the model, to follow the file's name.
     pub(crate) fn load(
         source: GraphSource,
         sidecar: &ModelSidecar,
@@ -100,24 +100,28 @@ impl Graph {
         limits: LoadLimits,
     ) -> Result<std::result::Result<Self, String>> {
         let environment = runtime.environment().clone();
-        let job = move || builder(&environment, threads).and_then(|found| source.commit(found));
-        let within = JobLimits {
+        let job_limits = JobLimits {
             time: limits.time.get(),
             memory: limits.memory,
         };
-        let session = match runtime.thread().run_or_leave(within, job)? {
-            Ended::InTime(session) => session,
-            Ended::Late => {
+        let end = runtime.thread().run_or_leave(job_limits, move || {
+            session_builder(&environment, threads).and_then(|builder| source.commit(builder))
+        })?;
+        let session = match end {
+            JobEnd::Finished(session) => session,
+            JobEnd::TimedOut => {
                 let problem = format!(
                     "takes longer than {} s to load; allow more with --llie-options timeout=SECONDS (0: no limit)",
                     limits.time
                 );
                 return Ok(Err(problem));
             }
-            Ended::TooLarge => return Ok(Err(RunFailure::TooLarge(limits.memory).words())),
+            JobEnd::MemoryExceeded => {
+                return Ok(Err(RunFailure::MemoryExceeded(limits.memory).message()));
+            }
         };
         Ok(session
-            .map_err(|e| load_problem(&one_line(&e), runtime.version()))
+            .map_err(|e| describe_load_failure(&one_line(&e), runtime.version()))
             .and_then(|session| Self::new(session, sidecar, preset, runtime))
             .map(|mut graph| {
                 graph.limit_time(limits.time);
@@ -133,7 +137,7 @@ impl Graph {
         runtime: &Runtime,
     ) -> std::result::Result<Self, String> {
         let (mut inputs, mut outputs) = (ports(session.inputs()), ports(session.outputs()));
-        let batch = take_batch(&mut inputs, &mut outputs);
+        let batch = remove_batch(&mut inputs, &mut outputs);
         let convention = match preset {
             None => sidecar.clone(),
             Some(preset) => {
@@ -141,7 +145,7 @@ impl Graph {
                 sidecar.clone().with_defaults(&preset)
             }
         };
-        let differing = preset.and_then(|preset| preset.differing(&inputs, &outputs));
+        let preset_differences = preset.and_then(|preset| preset.differences(&inputs, &outputs));
         let ports = Ports {
             inputs,
             outputs,
@@ -149,7 +153,10 @@ impl Graph {
         };
         let session = Arc::new(Mutex::new(session));
         let graph = Self::from_session(session, Arc::new(ports), convention, runtime)?;
-        Ok(Self { differing, ..graph })
+        Ok(Self {
+            preset_differences,
+            ..graph
+        })
     }
 
     fn from_session(
@@ -163,10 +170,10 @@ impl Graph {
         let releasing = SessionOptions::releasing_memory(&signature.outputs);
         let releasing = releasing.map_err(|e| one_line(&e))?;
         Ok(Self {
-            feeding: Feeding::new(&signature, &convention),
-            reading: Arc::new(Composition::new(&signature, &convention)?),
+            encoding: InputEncoding::new(&signature, &convention),
+            decoding: Arc::new(Composition::new(&signature, &convention)?),
             convention,
-            differing: None,
+            preset_differences: None,
             signature: Arc::new(signature),
             runtime: runtime.clone(),
             session,
@@ -178,10 +185,10 @@ impl Graph {
         })
     }
 
-    /// The same session, fed and read by another convention.
+    /// The same session with another convention of its inputs and outputs.
     ///
     /// # Errors
-    /// If the graph contradicts it; the message follows the file's name.
+    /// If the graph contradicts the convention; the message follows the file's name.
     pub(crate) fn with_convention(
         &self,
         convention: ModelSidecar,
@@ -190,11 +197,13 @@ impl Graph {
         let mut graph = Self::from_session(session, ports, convention, &self.runtime)?;
         graph.clock = Mutex::new(*self.clock());
         graph.memory = self.memory;
-        graph.differing.clone_from(&self.differing);
+        graph
+            .preset_differences
+            .clone_from(&self.preset_differences);
         Ok(graph)
     }
 
-    /// Remark on unread outputs that have the image's size; `None` if there are none, or if a statement or a preset defines the image.
+    /// Caveat about unused outputs of the image's size; `None` without such outputs, or if sidecar or preset state the image.
     pub(crate) fn unread_images(&self) -> Option<String> {
         let is_stated = self.convention.image.is_some() || self.convention.output.is_some();
         let unread: Vec<String> = self
@@ -215,37 +224,37 @@ impl Graph {
         })
     }
 
-    /// The ONNX Runtime that runs it.
+    /// The ONNX Runtime that runs the graph.
     pub(crate) fn runtime(&self) -> &Runtime {
         &self.runtime
     }
 
-    /// Number of images of each run: 1, or the graph's fixed batch size.
+    /// The graph's fixed batch size, else 1.
     pub(crate) fn batch(&self) -> usize {
         self.ports.batch
     }
 
-    /// Sets the time that the runs of one image may take together.
+    /// Sets the limit of the total time of one image's runs.
     pub(crate) fn limit_time(&mut self, limit: TimeLimit) {
         *self.clock() = ImageClock::new(limit);
     }
 
-    /// The time that the runs of one image may take together.
+    /// Limit of the total time of one image's runs.
     pub(crate) fn time_limit(&self) -> TimeLimit {
         self.clock().time_limit()
     }
 
-    /// Sets the memory that the process may take while the model runs.
+    /// Sets the limit of the process's memory while the model runs.
     pub(crate) fn limit_memory(&mut self, limit: MemoryLimit) {
         self.memory = limit;
     }
 
-    /// The memory that the process may take while the model runs.
+    /// Limit of the process's memory while the model runs.
     pub(crate) fn memory_limit(&self) -> MemoryLimit {
         self.memory
     }
 
-    /// Begins the time of another image, or of a trial.
+    /// Restarts the clock for another image or a trial.
     pub(crate) fn restart_clock(&self) {
         self.clock().restart();
     }
@@ -254,34 +263,37 @@ impl Graph {
         self.clock.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// A handle that ends a run from another thread.
+    /// A handle that stops runs from another thread.
     pub(crate) fn stopper(&self) -> Stopper {
         Stopper(Arc::clone(&self.options))
     }
 
-    /// Runs the model on a window of an image; returns the bytes of a part of the window.
-    pub(crate) fn window(
+    /// Runs the model on a window of an image; returns the bytes of `part`, whose position is relative to the window.
+    pub(crate) fn run_window(
         &self,
         dark: &DarkImage<'_>,
         window: TileWindow,
         part: TileWindow,
     ) -> Result<RunResult<Vec<u8>>> {
-        let fed = self.fed(dark, window);
-        let mut further = self.signature.extras.iter();
-        if let Some(problem) = further.find_map(|input| input.check_cut(&fed).err()) {
-            return Ok(RunResult::Failed(RunFailure::NotCut(problem)));
+        let fed = self.fed_window(dark, window);
+        for input in &self.signature.extras {
+            if let Err(problem) = input.check_tileable(&fed) {
+                return Ok(RunResult::Failed(RunFailure::CannotTile(problem)));
+            }
         }
-        let used = TileWindow {
+        let part_in_image = TileWindow {
             left: window.left + part.left,
             top: window.top + part.top,
             right: window.left + part.right,
             bottom: window.top + part.bottom,
         };
-        let needed = self.reading.needs_dark();
-        let dark = needed.then(|| self.fed(dark, used).planes().into_owned());
-        let (reading, size) = (Arc::clone(&self.reading), window.size());
+        let dark = self
+            .decoding
+            .needs_dark()
+            .then(|| self.fed_window(dark, part_in_image).planes().into_owned());
+        let (decoding, size) = (Arc::clone(&self.decoding), window.size());
         self.run(&self.options, &fed, move |outputs| {
-            reading.bytes(outputs, size, part, dark.as_ref())
+            decoding.bytes(outputs, size, part, dark.as_ref())
         })
     }
 
@@ -290,7 +302,7 @@ impl Graph {
         self.probe_memory(image, window, Arena::Kept)
     }
 
-    /// The same, for a measurement of memory: with the arena as it is, or released afterwards.
+    /// Runs the model like [`Self::probe`], and keeps or releases the arena afterwards, for measurements of memory.
     pub(crate) fn probe_memory(
         &self,
         image: &Rgb,
@@ -302,108 +314,111 @@ impl Graph {
             Arena::Released => &self.releasing,
         };
         let dark = DarkImage::new(image);
-        self.run(options, &self.fed(&dark, window), |_| Ok(()))
+        self.run(options, &self.fed_window(&dark, window), |_| Ok(()))
     }
 
-    /// Runs the model on a whole image of floats.
-    pub(crate) fn planes(&self, planes: &Planes) -> Result<RunResult<Planes>> {
-        let (reading, size) = (Arc::clone(&self.reading), planes.size());
-        let dark = reading.needs_dark().then(|| planes.clone());
+    /// Runs the model on a whole image of floats, such as a resized one.
+    pub(crate) fn run_planes(&self, planes: &Planes) -> Result<RunResult<Planes>> {
+        let (decoding, size) = (Arc::clone(&self.decoding), planes.size());
+        let dark = decoding.needs_dark().then(|| planes.clone());
         self.run(&self.options, &FedImage::Whole(planes), move |outputs| {
-            reading.planes(outputs, size, TileWindow::whole(size), dark.as_ref())
+            decoding.planes(outputs, size, TileWindow::whole(size), dark.as_ref())
         })
     }
 
-    /// Runs the model once on a whole image, and reads it by the conventions of several graphs, which feed it as this one does.
-    pub(crate) fn readings(&self, image: &Rgb, graphs: &[Self]) -> Result<RunResult<Vec<Codes>>> {
-        let readings: Vec<Arc<Composition>> = graphs
+    /// Runs the model once on a whole image, and decodes its output by the conventions of several graphs, which share the input encoding.
+    pub(crate) fn run_with_conventions(
+        &self,
+        image: &Rgb,
+        graphs: &[Self],
+    ) -> Result<RunResult<Vec<UnclampedImage>>> {
+        let decodings: Vec<Arc<Composition>> = graphs
             .iter()
-            .map(|graph| Arc::clone(&graph.reading))
+            .map(|graph| Arc::clone(&graph.decoding))
             .collect();
         let dark = Planes::from_rgb(image);
         let fed = dark.clone();
         self.run(&self.options, &FedImage::Whole(&fed), move |outputs| {
             let size = dark.size();
-            let codes = readings.iter().map(|reading| {
-                let dark = reading.needs_dark().then_some(&dark);
-                let planes = reading.planes(outputs, size, TileWindow::whole(size), dark);
-                // The rules about plausible images name values that are none.
-                planes.map_or_else(
-                    |_| Codes::unusable(size),
-                    |planes| Codes::from_planes(&planes),
-                )
-            });
-            Ok(codes.collect())
+            Ok(decodings
+                .iter()
+                .map(|decoding| {
+                    let dark = decoding.needs_dark().then_some(&dark);
+                    match decoding.planes(outputs, size, TileWindow::whole(size), dark) {
+                        Ok(planes) => UnclampedImage::from_planes(&planes),
+                        // The plausibility rules then report the flaw.
+                        Err(_) => UnclampedImage::not_a_number(size),
+                    }
+                })
+                .collect())
         })
     }
 
-    fn fed<'a>(&self, dark: &'a DarkImage<'a>, window: TileWindow) -> FedImage<'a> {
+    fn fed_window<'a>(&self, dark: &'a DarkImage<'a>, window: TileWindow) -> FedImage<'a> {
         FedImage::Window {
             dark,
             window,
-            pad: self.feeding.pad,
+            pad: self.encoding.pad,
         }
     }
 
-    /// The tensors of all inputs, by name; `None` if expressions in the sidecar give values that are not finite.
+    /// Tensors of all inputs, by name; `None` if expressions in the sidecar give values that are not finite.
     fn inputs(&self, fed: &FedImage<'_>) -> Option<Vec<(String, Tensor)>> {
-        let name = |port: &Port| port.name.clone();
-        let image = self.feeding.tensor(fed)?;
-        let mut inputs = vec![(name(&self.signature.input.port), image)];
+        let image = self.encoding.tensor(fed)?;
+        let mut inputs = vec![(self.signature.input.port.name.clone(), image)];
         for extra in &self.signature.extras {
-            inputs.push((name(&extra.port), extra.tensor(fed)?));
+            inputs.push((extra.port.name.clone(), extra.tensor(fed)?));
         }
         Some(inputs)
     }
 
-    /// Runs the model, and reads its outputs before another run overwrites them.
+    /// Runs the model, and decodes its outputs with `read` before another run overwrites them.
     fn run<T: Send + 'static>(
         &self,
         options: &Arc<SessionOptions>,
         fed: &FedImage<'_>,
-        read: impl FnOnce(&[ImageTensor<'_>]) -> std::result::Result<T, OutOfRange> + Send + 'static,
+        read: impl FnOnce(&[ImageTensor<'_>]) -> std::result::Result<T, InvalidValues> + Send + 'static,
     ) -> Result<RunResult<T>> {
         let Some(inputs) = self.inputs(fed) else {
-            return Ok(RunResult::Unusable(OutOfRange::NotFed));
+            return Ok(RunResult::Unusable(InvalidValues::NonFiniteInput));
         };
         let size = fed.size();
         let (session, signature) = (Arc::clone(&self.session), Arc::clone(&self.signature));
-        let (reading, used) = (Arc::clone(&self.reading), Arc::clone(options));
+        let (decoding, job_options) = (Arc::clone(&self.decoding), Arc::clone(options));
         let (clock, batch, start) = (*self.clock(), self.ports.batch, Instant::now());
+        let limits = JobLimits {
+            time: clock.remaining(),
+            memory: self.memory,
+        };
         let job = move || {
             let mut session = session.lock().unwrap_or_else(PoisonError::into_inner);
-            let result = run(
+            run(
                 &mut session,
-                &used,
+                &job_options,
                 batch,
                 inputs,
                 &signature.outputs,
-                |outputs| match reading.laid_out(outputs, size) {
+                |outputs| match decoding.assign_layouts(outputs, size) {
                     Ok(images) => read(&images).map_or_else(RunResult::Unusable, RunResult::Output),
-                    Err(other) => RunResult::Failed(other.failure(size)),
+                    Err(wrong_size) => RunResult::Failed(wrong_size.failure(size)),
                 },
-            );
-            result
-                .unwrap_or_else(|e| RunResult::Failed(RunFailure::from_message(size, one_line(&e))))
+            )
+            .unwrap_or_else(|e| RunResult::Failed(RunFailure::from_message(size, one_line(&e))))
         };
-        let limits = JobLimits {
-            time: clock.left(),
-            memory: self.memory,
-        };
-        let ended = self
+        let end = self
             .runtime
             .thread()
             .run_within(limits, || options.end_run(), job)?;
         self.clock().add(start.elapsed());
-        Ok(match (ended, clock.limit()) {
-            (Ended::InTime(result), _) => result,
-            (Ended::Late, limit) => {
+        Ok(match (end, clock.limit()) {
+            (JobEnd::Finished(result), _) => result,
+            (JobEnd::TimedOut, limit) => {
                 options.allow_runs();
-                RunResult::Failed(RunFailure::TooLong(limit.unwrap_or_default()))
+                RunResult::Failed(RunFailure::TimedOut(limit.unwrap_or_default()))
             }
-            (Ended::TooLarge, _) => {
+            (JobEnd::MemoryExceeded, _) => {
                 options.allow_runs();
-                RunResult::Failed(RunFailure::TooLarge(self.memory))
+                RunResult::Failed(RunFailure::MemoryExceeded(self.memory))
             }
         })
     }

@@ -15,32 +15,34 @@ use crate::conventions::ElementType;
 use crate::inputs::{Tensor as InputTensor, TensorData};
 use crate::outputs::{Output, OutputTensor, TensorSamples};
 
-/// Options of the runs of a session: the selected outputs, and the signal to stop.
+/// Run options of a session: the selected outputs, and the signal to stop.
 pub(super) struct SessionOptions {
     options: RunOptions<HasSelectedOutputs>,
-    /// Whether every later run is to be stopped too.
+    /// True if every later run is to be stopped too.
     stopped: AtomicBool,
 }
 
 impl SessionOptions {
     /// Options for runs that return these outputs.
     pub(super) fn for_outputs(outputs: &[Output]) -> ort::Result<Self> {
-        let none = OutputSelector::no_default();
-        let selected = outputs
+        let selector = outputs
             .iter()
-            .fold(none, |all, output| all.with(&output.port.name));
+            .fold(OutputSelector::no_default(), |selector, output| {
+                selector.with(&output.port.name)
+            });
         Ok(Self {
-            options: RunOptions::new()?.with_outputs(selected),
+            options: RunOptions::new()?.with_outputs(selector),
             stopped: AtomicBool::new(false),
         })
     }
 
-    /// The same options for runs that give back the memory of ONNX Runtime's arena at their end.
+    /// Options for runs that return these outputs and release ONNX Runtime's memory arena at their end.
     pub(super) fn releasing_memory(outputs: &[Output]) -> ort::Result<Self> {
-        let mut own = Self::for_outputs(outputs)?;
-        own.options
+        let mut options = Self::for_outputs(outputs)?;
+        options
+            .options
             .set("memory.enable_memory_arena_shrinkage", "cpu:0")?;
-        Ok(own)
+        Ok(options)
     }
 
     /// Stops the current run. ONNX Runtime ends it between two nodes of the graph.
@@ -51,7 +53,7 @@ impl SessionOptions {
         }
     }
 
-    /// Lets later runs be, after [`Self::end_run`], unless all are to be stopped.
+    /// Allows runs again after [`Self::end_run`], unless all are to be stopped.
     pub(super) fn allow_runs(&self) {
         if let Err(e) = self.options.unterminate() {
             tracing::debug!("the enhancer cannot go on: {e}");
@@ -62,10 +64,9 @@ impl SessionOptions {
     }
 }
 
-// SAFETY: `ort` withholds `Sync` because a selected output may hold a preallocated tensor, which two runs would write at
-// once. None is ever preallocated here (`SessionOptions::for_outputs` selects by name alone), and the session's mutex keeps runs
-// apart. The only calls during a run are `terminate` and `unterminate`, which ONNX Runtime documents for use from another
-// thread: they set one flag.
+// SAFETY: `ort` withholds `Sync` because a selected output may have a preallocated tensor, to which two runs could write at once. Outputs
+// are never preallocated here (`SessionOptions::for_outputs` selects by name alone), and the session's mutex prevents concurrent runs. The
+// only calls during a run are `terminate` and `unterminate`, which ONNX Runtime documents for use from another thread: they set one flag.
 #[expect(unsafe_code, reason = "there is no other way to stop a run")]
 unsafe impl Sync for SessionOptions {}
 
@@ -81,14 +82,17 @@ impl Stopper {
     }
 }
 
-/// Message of an error of ONNX Runtime, in one line.
+/// Message of an ONNX Runtime error, in one line.
 pub(super) fn one_line(error: &ort::Error) -> String {
-    let words: Vec<&str> = error.message().split_whitespace().collect();
-    words.join(" ")
+    error
+        .message()
+        .split_whitespace()
+        .collect::<Vec<_>>()
+        .join(" ")
 }
 
-/// Runs a session on its inputs, by name, and reads its outputs before another run overwrites them. A graph of a fixed batch gets
-/// each image as often as it asks for, and the first result is read.
+/// Runs a session on named inputs, and decodes its outputs with `read` before another run overwrites them. For a graph with a fixed batch
+/// size, each image is repeated, and the first result is decoded.
 pub(super) fn run<T>(
     session: &mut Session,
     options: &SessionOptions,
@@ -99,7 +103,7 @@ pub(super) fn run<T>(
 ) -> ort::Result<T> {
     let inputs = inputs
         .into_iter()
-        .map(|(name, input)| Ok((name, SessionInputValue::from(tensor(input, batch)?))))
+        .map(|(name, input)| Ok((name, SessionInputValue::from(to_ort_tensor(input, batch)?))))
         .collect::<ort::Result<Vec<_>>>()?;
     let results = session.run_with_options(inputs, &options.options)?;
     let tensors = outputs
@@ -112,7 +116,7 @@ pub(super) fn run<T>(
     Ok(read(&tensors))
 }
 
-/// The first image of an output.
+/// First image of an output.
 fn output_tensor<'a>(
     value: &'a DynValue,
     element: &ElementType,
@@ -121,32 +125,32 @@ fn output_tensor<'a>(
     let (dims, samples) = match element {
         ElementType::Uint8 => {
             let (dims, samples) = value.try_extract_tensor::<u8>()?;
-            let (dims, samples) = first_of(batch, dims, samples);
+            let (dims, samples) = first_image(batch, dims, samples);
             (dims, TensorSamples::Uint8(samples))
         }
         ElementType::Float16 => {
             let (dims, samples) = value.try_extract_tensor::<half::f16>()?;
-            let (dims, samples) = first_of(batch, dims, samples);
+            let (dims, samples) = first_image(batch, dims, samples);
             (dims, TensorSamples::Float16(samples))
         }
         ElementType::Float64 => {
             let (dims, samples) = value.try_extract_tensor::<f64>()?;
-            let (dims, samples) = first_of(batch, dims, samples);
+            let (dims, samples) = first_image(batch, dims, samples);
             (dims, TensorSamples::Float64(samples))
         }
         ElementType::Int32 => {
             let (dims, samples) = value.try_extract_tensor::<i32>()?;
-            let (dims, samples) = first_of(batch, dims, samples);
+            let (dims, samples) = first_image(batch, dims, samples);
             (dims, TensorSamples::Int32(samples))
         }
         ElementType::Int64 => {
             let (dims, samples) = value.try_extract_tensor::<i64>()?;
-            let (dims, samples) = first_of(batch, dims, samples);
+            let (dims, samples) = first_image(batch, dims, samples);
             (dims, TensorSamples::Int64(samples))
         }
         _ => {
             let (dims, samples) = value.try_extract_tensor::<f32>()?;
-            let (dims, samples) = first_of(batch, dims, samples);
+            let (dims, samples) = first_image(batch, dims, samples);
             (dims, TensorSamples::Float32(samples))
         }
     };
@@ -154,7 +158,7 @@ fn output_tensor<'a>(
 }
 
 /// Dimensions and samples of the first image of a batch.
-fn first_of<'a, T>(batch: usize, dims: &[i64], samples: &'a [T]) -> (Vec<i64>, &'a [T]) {
+fn first_image<'a, T>(batch: usize, dims: &[i64], samples: &'a [T]) -> (Vec<i64>, &'a [T]) {
     let mut dims = dims.to_vec();
     match dims.first_mut() {
         Some(first) if batch > 1 && usize::try_from(*first) == Ok(batch) => {
@@ -165,8 +169,8 @@ fn first_of<'a, T>(batch: usize, dims: &[i64], samples: &'a [T]) -> (Vec<i64>, &
     }
 }
 
-/// A tensor; an image is repeated along the dimension of the batch, which is 1.
-fn tensor(input: InputTensor, batch: usize) -> ort::Result<DynValue> {
+/// Converts a tensor for ONNX Runtime. A tensor of rank 4 with a first dimension of 1 is repeated `batch` times along it.
+fn to_ort_tensor(input: InputTensor, batch: usize) -> ort::Result<DynValue> {
     let InputTensor { mut dims, data } = input;
     let times = match dims.as_mut_slice() {
         [first @ 1, _, _, _] => {
@@ -176,45 +180,31 @@ fn tensor(input: InputTensor, batch: usize) -> ort::Result<DynValue> {
         _ => 1,
     };
     Ok(match data {
-        TensorData::Bool(values) => Tensor::from_array((dims, repeated(values, times)))?.into_dyn(),
-        TensorData::Int8(values) => Tensor::from_array((dims, repeated(values, times)))?.into_dyn(),
-        TensorData::Int16(values) => {
-            Tensor::from_array((dims, repeated(values, times)))?.into_dyn()
-        }
-        TensorData::Int32(values) => {
-            Tensor::from_array((dims, repeated(values, times)))?.into_dyn()
-        }
-        TensorData::Int64(values) => {
-            Tensor::from_array((dims, repeated(values, times)))?.into_dyn()
-        }
-        TensorData::Uint8(values) => {
-            Tensor::from_array((dims, repeated(values, times)))?.into_dyn()
-        }
-        TensorData::Uint16(values) => {
-            Tensor::from_array((dims, repeated(values, times)))?.into_dyn()
-        }
-        TensorData::Uint32(values) => {
-            Tensor::from_array((dims, repeated(values, times)))?.into_dyn()
-        }
-        TensorData::Uint64(values) => {
-            Tensor::from_array((dims, repeated(values, times)))?.into_dyn()
-        }
+        TensorData::Bool(values) => Tensor::from_array((dims, repeat(values, times)))?.into_dyn(),
+        TensorData::Int8(values) => Tensor::from_array((dims, repeat(values, times)))?.into_dyn(),
+        TensorData::Int16(values) => Tensor::from_array((dims, repeat(values, times)))?.into_dyn(),
+        TensorData::Int32(values) => Tensor::from_array((dims, repeat(values, times)))?.into_dyn(),
+        TensorData::Int64(values) => Tensor::from_array((dims, repeat(values, times)))?.into_dyn(),
+        TensorData::Uint8(values) => Tensor::from_array((dims, repeat(values, times)))?.into_dyn(),
+        TensorData::Uint16(values) => Tensor::from_array((dims, repeat(values, times)))?.into_dyn(),
+        TensorData::Uint32(values) => Tensor::from_array((dims, repeat(values, times)))?.into_dyn(),
+        TensorData::Uint64(values) => Tensor::from_array((dims, repeat(values, times)))?.into_dyn(),
         TensorData::Float16(values) => {
-            Tensor::from_array((dims, repeated(values, times)))?.into_dyn()
+            Tensor::from_array((dims, repeat(values, times)))?.into_dyn()
         }
         TensorData::Bfloat16(values) => {
-            Tensor::from_array((dims, repeated(values, times)))?.into_dyn()
+            Tensor::from_array((dims, repeat(values, times)))?.into_dyn()
         }
         TensorData::Float32(values) => {
-            Tensor::from_array((dims, repeated(values, times)))?.into_dyn()
+            Tensor::from_array((dims, repeat(values, times)))?.into_dyn()
         }
         TensorData::Float64(values) => {
-            Tensor::from_array((dims, repeated(values, times)))?.into_dyn()
+            Tensor::from_array((dims, repeat(values, times)))?.into_dyn()
         }
     })
 }
 
-fn repeated<T: Copy>(values: Vec<T>, times: usize) -> Vec<T> {
+fn repeat<T: Copy>(values: Vec<T>, times: usize) -> Vec<T> {
     if times == 1 {
         values
     } else {
@@ -237,42 +227,46 @@ impl GraphSource {
     }
 }
 
-/// Builder of a session with this program's options. `threads` is the number of threads, by default that of the cores.
-pub(super) fn builder(
+/// Builder of a session with this program's options. `threads` is the number of threads, by default the number of cores.
+pub(super) fn session_builder(
     environment: &Environment,
     threads: Option<NonZeroUsize>,
 ) -> ort::Result<SessionBuilder> {
-    // By default ONNX Runtime pins one thread to each core, even if other programs use it.
+    // With its own default, ONNX Runtime would pin one thread to each core, even to cores that other programs use.
     let threads = threads
         .or_else(|| std::thread::available_parallelism().ok())
         .map_or(1, NonZeroUsize::get);
     let builder = Session::builder(environment)?
         .with_optimization_level(GraphOptimizationLevel::All)?
         .with_intra_threads(threads)?
-        // A memory plan fits images of one size only, but all are kept: twice the memory without benefit.
+        // ONNX Runtime keeps a memory plan for each image size, which doubles the memory without benefit.
         .with_memory_pattern(false)?
         .with_flush_to_zero()?;
     Ok(builder)
 }
 
-/// Largest batch of a graph for which an image is repeated; chosen, exports of a few images exist.
-const MOST_BATCH: usize = 64;
+/// Maximum fixed batch size for which an image is repeated; chosen (some models are exported with a batch of a few images).
+const MAX_BATCH: usize = 64;
 
-/// Images that each run takes, if the graph fixes a number above 1, and then makes the ports those of one image.
-pub(super) fn take_batch(inputs: &mut [Port], outputs: &mut [Port]) -> usize {
-    let fixed = |port: &Port| match port.dims.as_slice() {
-        [Dim::Known(batch @ 2..=MOST_BATCH), _, _, _] => Some(*batch),
-        _ => None,
-    };
-    let Some(batch) = inputs.iter().find_map(fixed) else {
+/// Sets a fixed batch dimension above 1 to 1 in all ports; returns the batch size, or 1 if it is not fixed.
+pub(super) fn remove_batch(inputs: &mut [Port], outputs: &mut [Port]) -> usize {
+    let Some(batch) = inputs.iter().find_map(fixed_batch) else {
         return 1;
     };
     for port in inputs.iter_mut().chain(outputs) {
-        if fixed(port) == Some(batch) {
+        if fixed_batch(port) == Some(batch) {
             port.dims[0] = Dim::Known(1);
         }
     }
     batch
+}
+
+/// Fixed batch size of a port of rank 4, if it is from 2 to [`MAX_BATCH`].
+fn fixed_batch(port: &Port) -> Option<usize> {
+    match port.dims.as_slice() {
+        [Dim::Known(batch @ 2..=MAX_BATCH), _, _, _] => Some(*batch),
+        _ => None,
+    }
 }
 
 /// Inputs or outputs of a session as ports.
@@ -306,10 +300,12 @@ fn port(outlet: &Outlet) -> Port {
             let dims = shape
                 .iter()
                 .zip(dimension_symbols.iter())
-                .map(|(size, symbol)| {
-                    usize::try_from(*size).map_or_else(|_| Dim::Free(symbol.clone()), Dim::Known)
-                });
-            (element, dims.collect())
+                .map(|(size, symbol)| match usize::try_from(*size) {
+                    Ok(size) => Dim::Known(size),
+                    Err(_) => Dim::Free(symbol.clone()),
+                })
+                .collect();
+            (element, dims)
         }
         other => (ElementType::Other(other.to_string()), Vec::new()),
     };

@@ -1,4 +1,4 @@
-//! The image of one run of a model, from which all its inputs are made: [`FedImage`], [`DarkImage`].
+//! Image of one run of a model, from which all inputs are computed: [`FedImage`], [`DarkImage`].
 
 use std::borrow::Cow;
 use std::cell::OnceCell;
@@ -8,7 +8,7 @@ use crate::planes::Planes;
 use crate::sizing::TileWindow;
 use darkqa_ground::types::{Digest, Rgb};
 
-/// A whole dark image. Noise that a model takes depends on its digest, which is computed once at most.
+/// A whole degraded image. Noise inputs depend on its digest, which is computed at most once.
 pub(crate) struct DarkImage<'a> {
     pub(super) rgb: &'a Rgb,
     digest: OnceCell<Digest>,
@@ -23,9 +23,9 @@ impl<'a> DarkImage<'a> {
     }
 }
 
-/// The image of one run of a model.
+/// Image that is fed to a model in one run.
 pub(crate) enum FedImage<'a> {
-    /// A window of a dark image, padded beyond the image's edges.
+    /// A window of a degraded image, padded beyond the image's edges.
     Window {
         dark: &'a DarkImage<'a>,
         window: TileWindow,
@@ -44,7 +44,7 @@ impl FedImage<'_> {
         }
     }
 
-    /// Row and column of its first pixel in the whole image.
+    /// Row and column of the first pixel within the whole image.
     pub(super) fn origin(&self) -> [usize; 2] {
         match self {
             Self::Window { window, .. } => [window.top, window.left],
@@ -52,7 +52,7 @@ impl FedImage<'_> {
         }
     }
 
-    /// Whether it contains the whole dark image.
+    /// True if the whole degraded image is included.
     pub(super) fn is_whole(&self) -> bool {
         match self {
             Self::Window { dark, window, .. } => {
@@ -64,7 +64,7 @@ impl FedImage<'_> {
         }
     }
 
-    /// Its samples in 0..1, red, green and blue.
+    /// The image as red, green and blue planes in 0..1.
     pub(crate) fn planes(&self) -> Cow<'_, Planes> {
         let (dark, window, pad) = match self {
             Self::Whole(planes) => return Cow::Borrowed(planes),
@@ -75,10 +75,12 @@ impl FedImage<'_> {
         for channel in 0..3 {
             for row in (window.top..window.bottom).map(|at| pad.source(at, dark.height())) {
                 for column in (window.left..window.right).map(|at| pad.source(at, dark.width())) {
-                    let place = row
-                        .zip(column)
-                        .map(|(row, column)| 3 * (row * dark.width() + column));
-                    let byte = place.map_or(0, |place| dark.samples()[place + channel]);
+                    let byte = match (row, column) {
+                        (Some(row), Some(column)) => {
+                            dark.samples()[3 * (row * dark.width() + column) + channel]
+                        }
+                        _ => 0,
+                    };
                     samples.push(f32::from(byte) / 255.0);
                 }
             }
@@ -90,16 +92,12 @@ impl FedImage<'_> {
         })
     }
 
-    /// Digest of the whole dark image: its size and its pixels.
+    /// Digest of the size and pixels of the whole degraded image.
     pub(super) fn digest(&self) -> Digest {
-        let of = |size: [usize; 2], bytes: &[u8]| {
-            let size = size.map(|side| (side as u64).to_le_bytes());
-            Digest::from_parts([&size[0][..], &size[1], bytes])
-        };
         match self {
             Self::Window { dark, .. } => *dark.digest.get_or_init(|| {
                 let size = [dark.rgb.height(), dark.rgb.width()];
-                of(size, dark.rgb.samples())
+                image_digest(size, dark.rgb.samples())
             }),
             Self::Whole(planes) => {
                 let bytes: Vec<u8> = planes
@@ -107,48 +105,54 @@ impl FedImage<'_> {
                     .iter()
                     .flat_map(|x| x.to_le_bytes())
                     .collect();
-                of([planes.height, planes.width], &bytes)
+                image_digest([planes.height, planes.width], &bytes)
             }
         }
     }
+}
+
+/// Digest of the height and width of an image and the bytes of its samples.
+fn image_digest(size: [usize; 2], bytes: &[u8]) -> Digest {
+    let [height, width] = size.map(|side| (side as u64).to_le_bytes());
+    Digest::from_parts([&height[..], &width, bytes])
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    /// A window with two rows of an image.
+    fn columns<'a>(dark: &'a DarkImage<'a>, left: usize, right: usize) -> FedImage<'a> {
+        FedImage::Window {
+            dark,
+            window: TileWindow {
+                left,
+                top: 0,
+                right,
+                bottom: 2,
+            },
+            pad: Padding::Reflect,
+        }
+    }
+
     #[test]
-    fn a_window_is_padded_and_knows_its_place() {
+    fn window_has_padding_origin_and_digest() {
         let rgb = Rgb::new(1, 3, vec![0, 51, 102, 51, 51, 51, 255, 0, 0]).unwrap();
         let dark = DarkImage::new(&rgb);
-        let window = |left, right| TileWindow {
-            left,
-            top: 0,
-            right,
-            bottom: 2,
-        };
-        let fed = |left, right| FedImage::Window {
-            dark: &dark,
-            window: window(left, right),
-            pad: Padding::Reflect,
-        };
-        let planes = fed(1, 5).planes().into_owned();
+        let padded = columns(&dark, 1, 5);
+        let planes = padded.planes().into_owned();
         assert_eq!((planes.height, planes.width), (2, 4));
         assert_eq!(
             planes.samples[..8],
             [0.2, 1.0, 0.2, 0.0, 0.2, 1.0, 0.2, 0.0]
         );
-        assert_eq!(fed(1, 5).origin(), [0, 1]);
-        assert!(fed(0, 3).is_whole() && fed(0, 5).is_whole());
-        assert!(!fed(1, 5).is_whole() && !fed(0, 2).is_whole());
-        assert_eq!(fed(0, 2).digest(), fed(1, 5).digest());
-        let other = Rgb::new(3, 1, rgb.samples().to_vec()).unwrap();
-        let other = DarkImage::new(&other);
-        let other = FedImage::Window {
-            dark: &other,
-            window: window(0, 1),
-            pad: Padding::Reflect,
-        };
-        assert_ne!(fed(0, 2).digest(), other.digest());
+        assert_eq!(padded.origin(), [0, 1]);
+        let part = columns(&dark, 0, 2);
+        assert!(columns(&dark, 0, 3).is_whole() && columns(&dark, 0, 5).is_whole());
+        assert!(!padded.is_whole() && !part.is_whole());
+        assert_eq!(part.digest(), padded.digest());
+        let transposed = Rgb::new(3, 1, rgb.samples().to_vec()).unwrap();
+        let transposed = DarkImage::new(&transposed);
+        assert_ne!(part.digest(), columns(&transposed, 0, 1).digest());
     }
 }

@@ -1,4 +1,4 @@
-//! An input of a graph beside the image: [`FurtherInput`].
+//! Input of a graph in addition to the image: [`FurtherInput`].
 
 use super::fed_image::FedImage;
 use super::noise;
@@ -14,21 +14,21 @@ pub(crate) struct FurtherInput {
     pub(crate) port: Port,
     /// Value of the input.
     pub(crate) value: ExtraValue,
-    /// Places of its channels, if it has any, its rows and its columns among its dimensions; `None` for one number.
-    places: Option<Places>,
+    /// Dimensions for channels, rows and columns; `None` for scalars and vectors.
+    axes: Option<Axes>,
 }
 
-/// Places of channels, rows and columns among the dimensions of a tensor.
+/// Indices of a tensor's dimensions for channels, rows and columns.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Places {
+struct Axes {
     channels: Option<usize>,
     rows: usize,
     columns: usize,
 }
 
-impl Places {
-    /// The places in a tensor of the image's size. Its layout is the one in which it has one or three channels, first of all
-    /// the image's own.
+impl Axes {
+    /// Axes of a tensor of the image's size; `None` for scalars and vectors. The layout is one with one or three channels, preferably that
+    /// of the image.
     fn for_port(port: &Port, image: TensorLayout) -> Option<Self> {
         if port.is_scalar() || vector_length(port).is_some() {
             return None;
@@ -40,15 +40,15 @@ impl Places {
                 columns: 1,
             });
         }
-        let all = || std::iter::once(image).chain(TensorLayout::ALL);
-        let fitting = || all().filter(|layout| layout.rank() == port.dims.len());
-        let [channels, rows, columns] = fitting()
-            .find(|layout| {
-                let channels = port.dims[layout.places()[0]].known();
-                matches!(channels, Some(1 | 3))
-            })
-            .or_else(|| fitting().next())?
-            .places();
+        let layouts: Vec<TensorLayout> = std::iter::once(image)
+            .chain(TensorLayout::ALL)
+            .filter(|layout| layout.rank() == port.dims.len())
+            .collect();
+        let [channels, rows, columns] = layouts
+            .iter()
+            .find(|layout| matches!(port.dims[layout.axes()[0]].known(), Some(1 | 3)))
+            .or(layouts.first())?
+            .axes();
         Some(Self {
             channels: Some(channels),
             rows,
@@ -56,55 +56,57 @@ impl Places {
         })
     }
 
-    /// The other dimensions.
+    /// Dimensions other than channels, rows and columns.
     fn others(self, port: &Port) -> impl Iterator<Item = &Dim> {
         let own = [self.channels, Some(self.rows), Some(self.columns)];
         port.dims
             .iter()
             .enumerate()
-            .filter(move |(place, _)| !own.contains(&Some(*place)))
+            .filter(move |(axis, _)| !own.contains(&Some(*axis)))
             .map(|(_, dim)| dim)
     }
 
-    /// Whether the graph fixes both rows and columns.
+    /// True if the graph fixes both height and width.
     fn are_fixed(self, port: &Port) -> bool {
         [self.rows, self.columns]
             .iter()
-            .all(|place| port.dims[*place].known().is_some())
+            .all(|axis| port.dims[*axis].known().is_some())
     }
 
-    /// Number of channels, if the graph states it.
+    /// Number of channels; `None` if the graph does not fix it.
     fn channels(self, port: &Port) -> Option<usize> {
-        self.channels
-            .map_or(Some(1), |place| port.dims[place].known())
+        match self.channels {
+            Some(axis) => port.dims[axis].known(),
+            None => Some(1),
+        }
     }
 }
 
 impl FurtherInput {
-    /// The input with the value that sidecar or preset give it.
+    /// The input with the value that sidecar or preset state. `image` is the layout of the image input.
     ///
     /// # Errors
-    /// If there is no value, or it does not fit; the message follows the file's name.
+    /// If the value is missing or does not fit the port; the message follows the file's name.
     pub(crate) fn new(
         port: &Port,
         value: Option<&ExtraValue>,
         image: TensorLayout,
         image_takes_any_side: bool,
     ) -> Result<Self, String> {
-        let places = Places::for_port(port, image);
-        if let Some(places) = places
-            && places.are_fixed(port)
+        let axes = Axes::for_port(port, image);
+        if let Some(axes) = axes
+            && axes.are_fixed(port)
             && image_takes_any_side
         {
             return Err(format!(
                 "takes {port} in addition to the image, a tensor of a fixed size that is not the image's; export the model with its values as constants"
             ));
         }
-        let value = value.ok_or_else(|| missing(port, places))?;
+        let value = value.ok_or_else(|| missing_value_message(port, axes))?;
         let input = Self {
             port: port.clone(),
             value: value.clone(),
-            places,
+            axes,
         };
         input.check().map_err(|problem| {
             format!("takes {port}; MODEL.onnx.toml or the preset sets it to {value}, but {problem}")
@@ -113,18 +115,17 @@ impl FurtherInput {
     }
 
     fn check(&self) -> Result<(), String> {
-        let key = quoted(&self.port.name);
-        if let Some(places) = self.places
-            && let Some(other) = places.others(&self.port).find(|dim| !dim.can_be(1))
+        let key = toml_key(&self.port.name);
+        if let Some(axes) = self.axes
+            && let Some(other) = axes.others(&self.port).find(|dim| !dim.can_be(1))
         {
             return Err(format!(
                 "its dimension of {other} is neither channels, height nor width"
             ));
         }
-        let floats = || TensorData::floats(&self.port.element, Vec::new()).is_some();
-        match (&self.value, self.places) {
+        match (&self.value, self.axes) {
             (ExtraValue::Number(number), None) | (ExtraValue::Map(number), Some(_)) => {
-                TensorData::filled(&self.port.element, *number, 1).map(drop)
+                TensorData::repeated(&self.port.element, *number, 1).map(drop)
             }
             (ExtraValue::List(numbers), None) => {
                 let length = vector_length(&self.port).unwrap_or(1);
@@ -134,7 +135,7 @@ impl FurtherInput {
                         list_line(&key, length)
                     ));
                 }
-                TensorData::listed(&self.port.element, numbers).map(drop)
+                TensorData::from_numbers(&self.port.element, numbers).map(drop)
             }
             (_, None) if vector_length(&self.port).is_some_and(|length| length > 1) => {
                 let length = vector_length(&self.port).unwrap_or(1);
@@ -150,14 +151,18 @@ impl FurtherInput {
                 "it has the image's size; `{key} = {{ map = {number} }}` gives every pixel this number"
             )),
             (_, None) => Err(format!("it takes a single number: `{key} = NUMBER`")),
-            (ExtraValue::Noise(_) | ExtraValue::From(_), Some(_)) if !floats() => Err(format!(
-                "its type {} cannot hold such values; export it as float32",
-                self.port.element
-            )),
+            (ExtraValue::Noise(_) | ExtraValue::From(_), Some(_))
+                if TensorData::from_floats(&self.port.element, Vec::new()).is_none() =>
+            {
+                Err(format!(
+                    "its type {} cannot hold such values; export it as float32",
+                    self.port.element
+                ))
+            }
             (ExtraValue::Noise(_), Some(_)) => Ok(()),
-            (ExtraValue::From(expression), Some(places)) => {
+            (ExtraValue::From(expression), Some(axes)) => {
                 let made = expression.channels(&vec![3; expression.names().len()]);
-                match (places.channels(&self.port), made) {
+                match (axes.channels(&self.port), made) {
                     (None | Some(3), _) | (Some(1), 1) => Ok(()),
                     (Some(1), _) => Err(
                         "this has three channels, and it takes one; wrap the expression in mean(…) or max(…)"
@@ -169,11 +174,11 @@ impl FurtherInput {
         }
     }
 
-    /// Checks that a run on this image alone gives what a run on the whole image would.
+    /// Checks that the input's value for a tile is a part of its value for the whole image.
     ///
     /// # Errors
-    /// If noise of another size than the image's would have to be cut.
-    pub(crate) fn check_cut(&self, fed: &FedImage<'_>) -> Result<(), String> {
+    /// For a tile, if the input is noise of a reduced size.
+    pub(crate) fn check_tileable(&self, fed: &FedImage<'_>) -> Result<(), String> {
         match &self.value {
             ExtraValue::Noise(noise) if noise.divide != 1 && !fed.is_whole() => Err(format!(
                 "takes noise of the image's size divided by {} ({:?}), which cannot be cut into tiles; leave out --llie-options tile, or enhance images of a size that the model takes",
@@ -183,29 +188,27 @@ impl FurtherInput {
         }
     }
 
-    /// Its tensor in a run on an image; `None` if the sidecar's expression gives values that are not finite.
+    /// Tensor of the input for a run on an image; `None` if the sidecar's expression gives values that are not finite.
     pub(crate) fn tensor(&self, fed: &FedImage<'_>) -> Option<Tensor> {
-        let Some(places) = self.places else {
+        let Some(axes) = self.axes else {
             if let ExtraValue::List(numbers) = &self.value {
-                let free = self.port.dims.iter().map(|dim| dim.known().unwrap_or(1));
-                let data = TensorData::listed(&self.port.element, numbers).ok()?;
                 return Some(Tensor {
-                    dims: free.collect(),
-                    data,
+                    dims: self.fixed_dims(),
+                    data: TensorData::from_numbers(&self.port.element, numbers).ok()?,
                 });
             }
-            return self.filled(vec![1; self.port.dims.len()]);
+            return self.constant_tensor(vec![1; self.port.dims.len()]);
         };
-        let channels = places.channels(&self.port);
+        let channels = axes.channels(&self.port);
         match &self.value {
             ExtraValue::Number(_) | ExtraValue::List(_) | ExtraValue::Map(_) => {
-                self.filled(self.dims(places, channels.unwrap_or(1), fed.size()))
+                self.constant_tensor(self.dims(axes, channels.unwrap_or(1), fed.size()))
             }
             ExtraValue::Noise(noise) => {
                 let channels = channels.unwrap_or(1);
                 let size = fed.size().map(|side| side.div_ceil(noise.divide));
-                let planes = noise::normal(noise, &self.port.name, channels, fed);
-                self.arranged(places, channels, size, planes)
+                let planes = noise::normal_noise(noise, &self.port.name, channels, fed);
+                self.arrange_planes(axes, channels, size, planes)
             }
             ExtraValue::From(expression) => {
                 let dark = fed.planes();
@@ -216,49 +219,54 @@ impl FurtherInput {
                 }
                 let [height, width] = fed.size();
                 let channels = image.samples.len() / (height * width).max(1);
-                let finite = image.samples.iter().all(|sample| sample.is_finite());
-                let tensor = self.arranged(places, channels, fed.size(), image.samples);
-                tensor.filter(|_| finite)
+                if !image.samples.iter().all(|sample| sample.is_finite()) {
+                    return None;
+                }
+                self.arrange_planes(axes, channels, fed.size(), image.samples)
             }
         }
     }
 
-    /// The same number at all places.
-    fn filled(&self, dims: Vec<usize>) -> Option<Tensor> {
+    /// Tensor of these dimensions filled with the value, if that is a single number.
+    fn constant_tensor(&self, dims: Vec<usize>) -> Option<Tensor> {
         let (ExtraValue::Number(number) | ExtraValue::Map(number)) = self.value else {
             return None;
         };
-        let data = TensorData::filled(&self.port.element, number, dims.iter().product());
-        data.ok().map(|data| Tensor { dims, data })
+        let data = TensorData::repeated(&self.port.element, number, dims.iter().product()).ok()?;
+        Some(Tensor { dims, data })
     }
 
-    /// Dimensions for an image of this size; those that are free otherwise are 1.
-    fn dims(&self, places: Places, channels: usize, [height, width]: [usize; 2]) -> Vec<usize> {
-        let mut dims: Vec<usize> = self
-            .port
+    /// Dimensions of the port, with 1 for dynamic ones.
+    fn fixed_dims(&self) -> Vec<usize> {
+        self.port
             .dims
             .iter()
             .map(|dim| dim.known().unwrap_or(1))
-            .collect();
-        if let Some(place) = places.channels {
-            dims[place] = channels;
+            .collect()
+    }
+
+    /// Dimensions for an image of this size; other dynamic dimensions are 1.
+    fn dims(&self, axes: Axes, channels: usize, [height, width]: [usize; 2]) -> Vec<usize> {
+        let mut dims = self.fixed_dims();
+        if let Some(axis) = axes.channels {
+            dims[axis] = channels;
         }
-        dims[places.rows] = height;
-        dims[places.columns] = width;
+        dims[axes.rows] = height;
+        dims[axes.columns] = width;
         dims
     }
 
-    /// Planes in the order of the tensor's dimensions.
-    fn arranged(
+    /// Tensor of planar samples, arranged in the order of the tensor's dimensions; `None` for a type other than floats.
+    fn arrange_planes(
         &self,
-        places: Places,
+        axes: Axes,
         channels: usize,
         size: [usize; 2],
         planes: Vec<f32>,
     ) -> Option<Tensor> {
         let plane = size[0] * size[1];
-        let planar = places.channels.is_none_or(|place| place < places.rows);
-        let values = if planar || channels == 1 {
+        let is_planar = axes.channels.is_none_or(|axis| axis < axes.rows);
+        let values = if is_planar || channels == 1 {
             planes
         } else {
             (0..plane)
@@ -266,13 +274,14 @@ impl FurtherInput {
                 .map(|(c, pixel)| planes[c * plane + pixel])
                 .collect()
         };
-        let dims = self.dims(places, channels, size);
-        let data = TensorData::floats(&self.port.element, values);
-        data.map(|data| Tensor { dims, data })
+        Some(Tensor {
+            dims: self.dims(axes, channels, size),
+            data: TensorData::from_floats(&self.port.element, values)?,
+        })
     }
 }
 
-/// Number of elements of an input with fixed dimensions, at most one of them not 1; `None` for others.
+/// Length of a vector: an input with fixed dimensions of which exactly one is above 1; `None` for others.
 fn vector_length(port: &Port) -> Option<usize> {
     let sizes = port
         .dims
@@ -283,20 +292,20 @@ fn vector_length(port: &Port) -> Option<usize> {
     (long == 1).then(|| sizes.iter().product())
 }
 
-/// The line of a sidecar for a list.
+/// Sidecar line for a list of numbers.
 fn list_line(key: &str, length: usize) -> String {
     let some = vec!["NUMBER"; length.min(4)].join(", ");
     let rest = if length > 4 { ", …" } else { "" };
     format!("`{key} = [{some}{rest}]`")
 }
 
-/// Message that names the sidecar lines needed for an input without a value.
-fn missing(port: &Port, places: Option<Places>) -> String {
-    let key = quoted(&port.name);
+/// Message about an input without a value, with the sidecar lines that would state one.
+fn missing_value_message(port: &Port, axes: Option<Axes>) -> String {
+    let key = toml_key(&port.name);
     let add = format!("{ADD}, below `[extra]`:");
-    let fits = |number| TensorData::filled(&port.element, number, 1).is_ok();
-    let known = preset::number_of(&port.name).filter(|(number, _)| fits(*number));
-    let Some(places) = places else {
+    let known = preset::known_number(&port.name)
+        .filter(|(number, _)| TensorData::repeated(&port.element, *number, 1).is_ok());
+    let Some(axes) = axes else {
         if let ElementType::Other(_) = port.element {
             return format!(
                 "takes {port} in addition to the image, an unsupported type; export the model with its value as a constant"
@@ -318,13 +327,13 @@ fn missing(port: &Port, places: Option<Places>) -> String {
             "takes {port} in addition to the image, and its value is unknown; {add} {line}"
         );
     };
-    if is_map(&port.name.to_lowercase()) {
+    if is_attention_map(&port.name.to_lowercase()) {
         return format!(
             "takes {port} in addition to the image, probably computed from it; {add} its formula, such as `{key} = {{ from = \"1 - max(image)\" }}`; a blur or a maximum over all pixels must be part of the export"
         );
     }
     let number = known.map_or("NUMBER".to_owned(), |(value, _)| value.to_string());
-    let channels = match places.channels(port) {
+    let channels = match axes.channels(port) {
         Some(1) => "one channel",
         Some(3) => "three channels",
         _ => "the image's size",
@@ -334,21 +343,21 @@ fn missing(port: &Port, places: Option<Places>) -> String {
     )
 }
 
-/// Words in the names of inputs that are made from the image.
+/// Parts of the names of inputs that are computed from the image.
 const ATTENTION: [&str; 4] = ["mask", "gray", "grey", "att"];
 
-/// Whether an input has the name of a map that is made from the image, or of noise, and not that of the image.
+/// True if an input's name suggests a map computed from the image, or noise, instead of the image itself.
 pub(crate) fn is_map_or_noise(name: &str) -> bool {
     let name = name.to_lowercase();
-    is_map(&name) || name == "z" || name.contains("noise")
+    is_attention_map(&name) || name == "z" || name.contains("noise")
 }
 
-fn is_map(lower_case_name: &str) -> bool {
+fn is_attention_map(lower_case_name: &str) -> bool {
     ATTENTION.iter().any(|word| lower_case_name.contains(word))
 }
 
-/// A name as a key of a TOML file, in quotes if needed.
-fn quoted(name: &str) -> String {
+/// A name as a TOML key, in quotes if needed.
+fn toml_key(name: &str) -> String {
     if !name.is_empty()
         && name
             .chars()

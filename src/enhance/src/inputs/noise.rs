@@ -1,15 +1,15 @@
-//! Noise that a model takes as an input: [`normal`].
+//! Noise as an input of a model: [`normal_noise`].
 
 use super::fed_image::FedImage;
 use crate::conventions::NoiseStatement;
 use darkqa_ground::types::FrameId;
 use darkqa_light::{Component, NoiseKey, Site};
 
-/// Normal noise for the input `name`: planes one after the other, of the image's size divided by `divide`.
+/// Normally distributed noise for the input `name`, in planar order, of the image's size divided by `divide`.
 ///
-/// Each number is a function of the seed, the whole dark image, the input's name, and its channel, row and column in the field
-/// of the whole image. So threads change nothing, and a tile gets its part of that field.
-pub(super) fn normal(
+/// Each number is a function of the seed, the whole degraded image, the input's name, and its channel, row and column in the noise field of
+/// the whole image. So the noise does not depend on threads, and a tile gets the corresponding part of the field.
+pub(super) fn normal_noise(
     statement: &NoiseStatement,
     name: &str,
     channels: usize,
@@ -46,14 +46,14 @@ mod tests {
         divide: 1,
     };
 
-    fn drawn(statement: &NoiseStatement, name: &str, rgb: &Rgb, window: TileWindow) -> Vec<f32> {
+    fn draw(statement: &NoiseStatement, name: &str, rgb: &Rgb, window: TileWindow) -> Vec<f32> {
         let dark = DarkImage::new(rgb);
         let fed = FedImage::Window {
             dark: &dark,
             window,
             pad: Padding::Reflect,
         };
-        normal(statement, name, 2, &fed)
+        normal_noise(statement, name, 2, &fed)
     }
 
     fn window(left: usize, right: usize) -> TileWindow {
@@ -66,53 +66,51 @@ mod tests {
     }
 
     #[test]
-    fn a_tile_gets_its_part_of_the_whole_field() {
+    fn noise_of_a_tile_is_part_of_the_whole_field() {
         let rgb = Rgb::black(40, 60);
-        let whole = drawn(&NOISE, "z", &rgb, window(0, 60));
-        let part = drawn(&NOISE, "z", &rgb, window(10, 30));
+        let whole = draw(&NOISE, "z", &rgb, window(0, 60));
+        let part = draw(&NOISE, "z", &rgb, window(10, 30));
         for (line, whole) in part.chunks_exact(20).zip(whole.chunks_exact(60)) {
             assert_eq!(line, &whole[10..30]);
         }
     }
 
     #[test]
-    fn seed_name_and_image_each_give_other_noise() {
+    fn noise_depends_on_seed_name_and_image() {
         let rgb = Rgb::black(40, 60);
-        let first = drawn(&NOISE, "z", &rgb, window(0, 60));
-        assert_eq!(first, drawn(&NOISE, "z", &rgb, window(0, 60)));
+        let first = draw(&NOISE, "z", &rgb, window(0, 60));
+        assert_eq!(first, draw(&NOISE, "z", &rgb, window(0, 60)));
         let seeded = NoiseStatement { seed: 4, ..NOISE };
         let mut other = Rgb::black(40, 60);
         other.samples_mut()[7] = 1;
-        for drawn in [
-            drawn(&seeded, "z", &rgb, window(0, 60)),
-            drawn(&NOISE, "y", &rgb, window(0, 60)),
-            drawn(&NOISE, "z", &other, window(0, 60)),
+        for different in [
+            draw(&seeded, "z", &rgb, window(0, 60)),
+            draw(&NOISE, "y", &rgb, window(0, 60)),
+            draw(&NOISE, "z", &other, window(0, 60)),
         ] {
-            assert!(
-                first
-                    .iter()
-                    .zip(&drawn)
-                    .filter(|(a, b)| a.to_bits() == b.to_bits())
-                    .count()
-                    < 10
-            );
+            let equal = first
+                .iter()
+                .zip(&different)
+                .filter(|(a, b)| a.to_bits() == b.to_bits())
+                .count();
+            assert!(equal < 10);
         }
         assert_ne!(first[..2400], first[2400..]);
     }
 
     #[test]
-    fn size_and_deviation_are_those_stated() {
+    fn noise_has_the_stated_size_and_deviation() {
         let rgb = Rgb::black(40, 60);
         let divided = NoiseStatement { divide: 8, ..NOISE };
-        assert_eq!(drawn(&divided, "z", &rgb, window(0, 60)).len(), 2 * 5 * 8);
+        assert_eq!(draw(&divided, "z", &rgb, window(0, 60)).len(), 2 * 5 * 8);
         let none = NoiseStatement { std: 0.0, ..NOISE };
-        let none = drawn(&none, "z", &rgb, window(0, 60));
+        let none = draw(&none, "z", &rgb, window(0, 60));
         assert!(none.iter().all(|x| x.abs() == 0.0));
-        let numbers = drawn(&NOISE, "z", &rgb, window(0, 60));
+        let numbers = draw(&NOISE, "z", &rgb, window(0, 60));
         let n = numbers.len() as f32;
         let mean = numbers.iter().sum::<f32>() / n;
         let variance = numbers.iter().map(|x| x * x).sum::<f32>() / n;
-        // Five standard errors of 4800 numbers.
+        // Bounds are five standard errors for 4800 numbers.
         assert!(mean.abs() < 5.0 * 0.5 / n.sqrt(), "{mean}");
         assert!(
             (variance - 0.25).abs() < 5.0 * 0.25 * (2.0 / n).sqrt(),

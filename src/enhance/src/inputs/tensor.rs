@@ -1,17 +1,17 @@
-//! [`Tensor`]: the value of one graph input.
+//! Value of one graph input: [`Tensor`].
 
 use half::{bf16, f16};
 
 use crate::conventions::{ElementType, Number};
 
-/// Elements of an input, and their dimensions.
+/// Dimensions and elements of an input.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Tensor {
     pub(crate) dims: Vec<usize>,
     pub(crate) data: TensorData,
 }
 
-/// Elements of an input.
+/// Elements of an input, by type.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum TensorData {
     Bool(Vec<bool>),
@@ -30,14 +30,13 @@ pub(crate) enum TensorData {
 }
 
 impl TensorData {
-    /// `count` times the same number.
+    /// The number, repeated `count` times.
     ///
-    /// A fraction becomes the nearest float. Everything else must fit exactly: whole numbers and truth values into their types,
-    /// and no float becomes infinite or 0.
+    /// A fraction is rounded to the nearest float of the type, but not to infinity or 0. Integers and booleans must be represented exactly.
     ///
     /// # Errors
     /// If the number does not fit; the message names the number and the type.
-    pub(super) fn filled(
+    pub(super) fn repeated(
         element: &ElementType,
         number: Number,
         count: usize,
@@ -47,15 +46,15 @@ impl TensorData {
                 Number::Bool(value) => Some(Self::Bool(vec![value; count])),
                 _ => None,
             },
-            ElementType::Int8 => whole(number, count).map(Self::Int8),
-            ElementType::Int16 => whole(number, count).map(Self::Int16),
-            ElementType::Int32 => whole(number, count).map(Self::Int32),
-            ElementType::Int64 => whole(number, count).map(Self::Int64),
-            ElementType::Uint8 => whole(number, count).map(Self::Uint8),
-            ElementType::Uint16 => whole(number, count).map(Self::Uint16),
-            ElementType::Uint32 => whole(number, count).map(Self::Uint32),
-            ElementType::Uint64 => whole(number, count).map(Self::Uint64),
-            _ => float(element, number).map(|value| match element {
+            ElementType::Int8 => repeat_integer(number, count).map(Self::Int8),
+            ElementType::Int16 => repeat_integer(number, count).map(Self::Int16),
+            ElementType::Int32 => repeat_integer(number, count).map(Self::Int32),
+            ElementType::Int64 => repeat_integer(number, count).map(Self::Int64),
+            ElementType::Uint8 => repeat_integer(number, count).map(Self::Uint8),
+            ElementType::Uint16 => repeat_integer(number, count).map(Self::Uint16),
+            ElementType::Uint32 => repeat_integer(number, count).map(Self::Uint32),
+            ElementType::Uint64 => repeat_integer(number, count).map(Self::Uint64),
+            _ => fitting_float(element, number).map(|value| match element {
                 ElementType::Float16 => Self::Float16(vec![f16::from_f64(value); count]),
                 ElementType::Bfloat16 => Self::Bfloat16(vec![bf16::from_f64(value); count]),
                 ElementType::Float64 => Self::Float64(vec![value; count]),
@@ -65,17 +64,17 @@ impl TensorData {
         fitting.ok_or_else(|| format!("{number} does not fit its type {element}"))
     }
 
-    /// These numbers, one after another; each must fit as in [`TensorData::filled`].
+    /// Elements from numbers, each of which must fit the type as in [`TensorData::repeated`].
     ///
     /// # Errors
     /// If a number does not fit; the message names the number and the type.
-    pub(super) fn listed(element: &ElementType, numbers: &[Number]) -> Result<Self, String> {
-        let mut all = Self::filled(element, Number::Integer(0), 0).or_else(|_| {
-            // A truth value has no 0.
-            Self::filled(element, Number::Bool(false), 0)
+    pub(super) fn from_numbers(element: &ElementType, numbers: &[Number]) -> Result<Self, String> {
+        let mut all = Self::repeated(element, Number::Integer(0), 0).or_else(|_| {
+            // For booleans, 0 does not fit.
+            Self::repeated(element, Number::Bool(false), 0)
         })?;
         for number in numbers {
-            match (&mut all, Self::filled(element, *number, 1)?) {
+            match (&mut all, Self::repeated(element, *number, 1)?) {
                 (Self::Bool(all), Self::Bool(one)) => all.extend(one),
                 (Self::Int8(all), Self::Int8(one)) => all.extend(one),
                 (Self::Int16(all), Self::Int16(one)) => all.extend(one),
@@ -89,15 +88,15 @@ impl TensorData {
                 (Self::Bfloat16(all), Self::Bfloat16(one)) => all.extend(one),
                 (Self::Float32(all), Self::Float32(one)) => all.extend(one),
                 (Self::Float64(all), Self::Float64(one)) => all.extend(one),
-                // Both are of the same type.
+                // Unreachable: both have the same type.
                 _ => {}
             }
         }
         Ok(all)
     }
 
-    /// Floats as elements of a float type; `None` for another type.
-    pub(super) fn floats(element: &ElementType, values: Vec<f32>) -> Option<Self> {
+    /// Elements of a float type; `None` for another type.
+    pub(super) fn from_floats(element: &ElementType, values: Vec<f32>) -> Option<Self> {
         Some(match element {
             ElementType::Float16 => Self::Float16(values.into_iter().map(f16::from_f32).collect()),
             ElementType::Bfloat16 => {
@@ -110,11 +109,11 @@ impl TensorData {
     }
 }
 
-/// Converts a whole number to an integer type and repeats it `count` times.
-fn whole<T: Copy + TryFrom<i128>>(number: Number, count: usize) -> Option<Vec<T>> {
+/// Converts a number to an integer type, if that is exact, and repeats it `count` times.
+fn repeat_integer<T: Copy + TryFrom<i128>>(number: Number, count: usize) -> Option<Vec<T>> {
     let whole = match number {
         Number::Integer(value) => i128::from(value),
-        // 2^64 is beyond every type, and all floats below are exact.
+        // Integers of 2^64 or more fit no type; smaller ones convert to `i128` exactly.
         Number::Float(value) if value.fract() == 0.0 && value.abs() < 2.0_f64.powi(65) => {
             value as i128
         }
@@ -123,25 +122,29 @@ fn whole<T: Copy + TryFrom<i128>>(number: Number, count: usize) -> Option<Vec<T>
     T::try_from(whole).ok().map(|value| vec![value; count])
 }
 
-/// A number as a float that the type can hold, see [`TensorData::filled`].
-fn float(element: &ElementType, number: Number) -> Option<f64> {
-    let rounded = |value: f64| match element {
+/// The number as a float, if it fits the float type by the rules of [`TensorData::repeated`].
+fn fitting_float(element: &ElementType, number: Number) -> Option<f64> {
+    match number {
+        Number::Bool(_) => None,
+        Number::Integer(integer) => {
+            let value = round_to_type(element, integer as f64)?;
+            (value.is_finite() && value as i128 == i128::from(integer)).then_some(value)
+        }
+        Number::Float(value) => {
+            let rounded = round_to_type(element, value)?;
+            (rounded.is_finite() && (rounded != 0.0 || value == 0.0)).then_some(value)
+        }
+    }
+}
+
+/// The value rounded to a float type; `None` for another type.
+fn round_to_type(element: &ElementType, value: f64) -> Option<f64> {
+    match element {
         ElementType::Float16 => Some(f16::from_f64(value).to_f64()),
         ElementType::Bfloat16 => Some(bf16::from_f64(value).to_f64()),
         ElementType::Float32 => Some(f64::from(value as f32)),
         ElementType::Float64 => Some(value),
         _ => None,
-    };
-    match number {
-        Number::Bool(_) => None,
-        Number::Integer(whole) => {
-            let value = rounded(whole as f64)?;
-            (value.is_finite() && value as i128 == i128::from(whole)).then_some(value)
-        }
-        Number::Float(value) => {
-            let kept = rounded(value)?;
-            (kept.is_finite() && (kept != 0.0 || value == 0.0)).then_some(value)
-        }
     }
 }
 
@@ -150,11 +153,11 @@ mod tests {
     use super::*;
 
     fn one(element: &ElementType, number: Number) -> Result<TensorData, String> {
-        TensorData::filled(element, number, 1)
+        TensorData::repeated(element, number, 1)
     }
 
     #[test]
-    fn every_type_takes_what_fits() {
+    fn fitting_numbers_are_converted_to_every_type() {
         let (whole, half) = (Number::Integer(3), Number::Float(0.5));
         let rows = [
             (
@@ -202,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_fit_is_named_with_its_type() {
+    fn error_names_the_number_and_the_type_it_does_not_fit() {
         for (element, number, text) in [
             (ElementType::Int32, Number::Float(3.5), "3.5"),
             (

@@ -1,6 +1,7 @@
-//! Installation of ONNX Runtime's library from its PyPI wheel into the user's cache: [`install`].
+//! Installation of the ONNX Runtime library from its PyPI wheel into the user's cache: [`install`].
 
 use std::env::consts;
+use std::fmt;
 use std::fs::{self, File};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
@@ -13,7 +14,7 @@ use super::library::PINNED;
 use super::library_file::LibraryFormat;
 use super::receipt::{self, hex};
 
-/// Library of one platform in the wheel of version [`PINNED`].
+/// The library in the wheel of version [`PINNED`] for one platform.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Pin {
     os: &'static str,
@@ -22,7 +23,7 @@ pub(super) struct Pin {
     tag: &'static str,
     /// File name of the library, in `onnxruntime/capi/` of the wheel.
     file: &'static str,
-    /// SHA-256 of the library, which is the same file in the wheels for all versions of Python.
+    /// SHA-256 of the library, which is identical in the wheels for all versions of Python.
     sha256: &'static str,
 }
 
@@ -59,7 +60,7 @@ const PINS: [Pin; 4] = [
 ];
 
 impl Pin {
-    /// Pin of the platform that this program was built for; `None` if no known wheel fits.
+    /// Pin for the platform of this build; `None` if no known wheel fits.
     pub(super) fn for_this_platform() -> Option<Self> {
         // The wheels need the GNU C library.
         if cfg!(target_env = "musl") {
@@ -68,8 +69,8 @@ impl Pin {
         Self::for_platform(consts::OS, consts::ARCH)
     }
 
-    /// Whether a file has the name of the library that is installed.
-    pub(super) fn is_for(self, path: &Path) -> bool {
+    /// True if a file has the name of the pinned library.
+    pub(super) fn matches_name(self, path: &Path) -> bool {
         path.file_name().is_some_and(|name| name == self.file)
     }
 
@@ -79,7 +80,7 @@ impl Pin {
     }
 }
 
-/// Commands that call pip, in the order in which they are tried.
+/// Commands that run pip, in the order in which they are tried.
 const PIPS: [&[&str]; 4] = [
     &["python3", "-m", "pip"],
     &["pip3"],
@@ -89,8 +90,8 @@ const PIPS: [&[&str]; 4] = [
 
 /// Downloads the pinned wheel with pip, extracts the library, checks it and puts it into `folder`; returns its path.
 ///
-/// The work is done in a temporary folder beside `folder`, and the library is then moved in one step. So two processes can
-/// install at once, and an interrupted one leaves nothing that could be loaded.
+/// The wheel is unpacked in a temporary folder next to `folder`, and the library is then moved in one step. So two processes can install at
+/// once, and an interrupted installation leaves nothing that could be loaded.
 ///
 /// # Errors
 /// A message that names the step that failed.
@@ -108,7 +109,7 @@ pub(super) fn install(pin: Pin, folder: &Path) -> Result<PathBuf, String> {
     let library = folder.join(pin.file);
     fs::create_dir_all(folder).map_err(|e| path_error(folder, "cannot be created", &e))?;
     match fs::rename(&unpacked, &library) {
-        // Windows does not replace a library that another process has loaded. That one is the same file.
+        // Windows does not replace a library that another process has loaded; its content is the same.
         Err(_) if library.is_file() => {}
         Err(error) => return Err(path_error(&library, "cannot be written", &error)),
         Ok(()) => {}
@@ -117,20 +118,19 @@ pub(super) fn install(pin: Pin, folder: &Path) -> Result<PathBuf, String> {
     Ok(library)
 }
 
-/// Checks that a library in the cache is the pinned one, whole and unchanged.
+/// Checks that a library in the cache is the complete and unchanged pinned one.
 ///
 /// # Errors
-/// A description of the fault, to follow its path.
+/// A message about the fault, to follow the library's path.
 pub(super) fn check_installed(library: &Path, pin: Pin) -> Result<(), String> {
     LibraryFormat::for_this_system().check(library)?;
     receipt::check(library, pin.sha256)
 }
 
-/// Downloads the wheel into `folder` with the first pip that is present.
+/// Downloads the wheel into `folder` with the first available pip.
 fn download(pin: Pin, folder: &Path) -> Result<(), String> {
     for pip in PIPS {
-        let output = download_command(pip, pin, folder).output();
-        match output {
+        match download_command(pip, pin, folder).output() {
             Ok(output) if output.status.success() => return Ok(()),
             Ok(output) if !is_missing(&output) => {
                 return Err(format!(
@@ -146,7 +146,7 @@ fn download(pin: Pin, folder: &Path) -> Result<(), String> {
     Err("there is no pip on PATH".to_owned())
 }
 
-/// Command that downloads the wheel; it works for any version of Python that runs pip.
+/// Command that downloads the wheel with any version of Python.
 fn download_command(pip: &[&str], pin: Pin, folder: &Path) -> Command {
     let mut command = Command::new(pip[0]);
     command
@@ -161,7 +161,7 @@ fn download_command(pip: &[&str], pin: Pin, folder: &Path) -> Command {
     command
 }
 
-/// Whether the program, or pip in its Python, does not exist.
+/// True if the program, or pip in its Python, does not exist.
 fn is_missing(output: &Output) -> bool {
     // 127 is the exit status of a shim (pyenv, asdf) for a program that does not exist.
     output.status.code() == Some(127)
@@ -170,30 +170,32 @@ fn is_missing(output: &Output) -> bool {
 
 /// Last non-empty line of stdout and stderr, else the exit status.
 fn last_line(output: &Output) -> String {
-    let text = [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes));
-    let last = text
+    [&output.stdout, &output.stderr]
+        .map(|bytes| String::from_utf8_lossy(bytes))
         .iter()
         .flat_map(|text| text.lines())
-        .rfind(|line| !line.trim().is_empty());
-    last.map_or_else(|| output.status.to_string(), |line| line.trim().to_owned())
+        .rfind(|line| !line.trim().is_empty())
+        .map_or_else(|| output.status.to_string(), |line| line.trim().to_owned())
 }
 
 fn wheel_in(folder: &Path) -> Result<PathBuf, String> {
-    let entries = fs::read_dir(folder).map_err(|e| path_error(folder, "cannot be read", &e))?;
-    entries
+    fs::read_dir(folder)
+        .map_err(|e| path_error(folder, "cannot be read", &e))?
         .filter_map(|entry| Some(entry.ok()?.path()))
         .find(|path| path.extension().is_some_and(|extension| extension == "whl"))
         .ok_or_else(|| "pip downloaded no wheel".to_owned())
 }
 
-/// Extracts the library from a wheel into `target`; an error if it is not the pinned one.
+/// Extracts the library from a wheel into `target`.
+///
+/// # Errors
+/// If the wheel cannot be read, or its library is not the pinned one.
 fn unpack(wheel: &Path, pin: Pin, target: &Path) -> Result<(), String> {
-    let broken = |e: &dyn std::error::Error| format!("{}: {e}", wheel.display());
-    let file = File::open(wheel).map_err(|e| broken(&e))?;
-    let mut archive = ZipArchive::new(file).map_err(|e| broken(&e))?;
+    let file = File::open(wheel).map_err(|e| unreadable_wheel(wheel, e))?;
+    let mut archive = ZipArchive::new(file).map_err(|e| unreadable_wheel(wheel, e))?;
     let mut library = archive
         .by_name(&format!("onnxruntime/capi/{}", pin.file))
-        .map_err(|e| broken(&e))?;
+        .map_err(|e| unreadable_wheel(wheel, e))?;
     let mut hasher = Sha256::new();
     copy(&mut library, target, &mut hasher)
         .map_err(|e| path_error(target, "cannot be written", &e))?;
@@ -207,7 +209,7 @@ fn unpack(wheel: &Path, pin: Pin, target: &Path) -> Result<(), String> {
     ))
 }
 
-/// Copies `source` into a file and into the hasher.
+/// Copies `source` to a file, and feeds its bytes to the hasher.
 fn copy(source: &mut impl Read, target: &Path, hasher: &mut Sha256) -> io::Result<()> {
     let mut file = File::create(target)?;
     let mut buffer = vec![0; 1 << 16];
@@ -219,6 +221,10 @@ fn copy(source: &mut impl Read, target: &Path, hasher: &mut Sha256) -> io::Resul
         hasher.update(&buffer[..length]);
         file.write_all(&buffer[..length])?;
     }
+}
+
+fn unreadable_wheel(wheel: &Path, error: impl fmt::Display) -> String {
+    format!("{}: {error}", wheel.display())
 }
 
 fn path_error(path: &Path, what: &str, error: &io::Error) -> String {
@@ -244,7 +250,7 @@ mod tests {
     }
 
     #[test]
-    fn the_pins_are_well_formed() {
+    fn pins_are_well_formed() {
         for pin in PINS {
             assert_eq!(pin.sha256.len(), 64);
             assert!(super::super::library::is_library_name(pin.os, pin.file));
@@ -272,14 +278,18 @@ mod tests {
     }
 
     #[cfg(unix)]
+    fn run_shell(script: &str) -> Output {
+        Command::new("sh").args(["-c", script]).output().unwrap()
+    }
+
+    #[cfg(unix)]
     #[test]
-    fn the_last_line_of_pip_is_reported() {
-        let output = |script| Command::new("sh").args(["-c", script]).output().unwrap();
-        let failed = output("echo Looking; echo 'ERROR: none found' >&2; echo >&2; exit 1");
+    fn last_line_of_pip_is_reported() {
+        let failed = run_shell("echo Looking; echo 'ERROR: none found' >&2; echo >&2; exit 1");
         assert_eq!(last_line(&failed), "ERROR: none found");
         assert!(!is_missing(&failed));
-        assert_eq!(last_line(&output("exit 3")), "exit status: 3");
-        assert!(is_missing(&output(
+        assert_eq!(last_line(&run_shell("exit 3")), "exit status: 3");
+        assert!(is_missing(&run_shell(
             "echo \"$0: No module named pip\" >&2; exit 1"
         )));
     }

@@ -1,4 +1,4 @@
-//! Check whether a file is a usable library of ONNX Runtime: [`probe`].
+//! Check of a candidate for the ONNX Runtime library, and its version: [`probe`].
 
 use std::error::Error as _;
 use std::ffi::CStr;
@@ -9,13 +9,13 @@ use ort::sys::OrtApiBase;
 
 use super::library_file::LibraryFormat;
 
-/// Version of the library that is installed if none is found; its pins are in `install.rs`.
+/// Version that is installed if no library is found; its checksums are in `install.rs`.
 pub(crate) const PINNED: &str = "1.31.1";
 
 /// Oldest usable minor version 1.x: the lowest version of the C API that the `ort` crate supports.
 pub(super) const OLDEST: u32 = ort::MINOR_VERSION;
 
-/// Whether a file has the name of ONNX Runtime's library on an operating system (named as in [`std::env::consts::OS`]).
+/// True if a file has the name of the ONNX Runtime library on an operating system (named as in [`std::env::consts::OS`]).
 pub(super) fn is_library_name(os: &str, name: &str) -> bool {
     match os {
         "windows" => name.eq_ignore_ascii_case("onnxruntime.dll"),
@@ -29,12 +29,13 @@ pub(super) fn is_library_name(os: &str, name: &str) -> bool {
     }
 }
 
-/// Checks a library's file, loads it, asks it for its version and unloads it; returns the version.
+/// Checks a library's file, loads it, gets its version and unloads it; returns the version.
 ///
-/// Nothing is loaded that is not a whole library with ONNX Runtime's entry; libraries of custom operators never are. All that could fail later is tried here, because `ort` panics if a library does not give it the API.
+/// Only complete libraries that export ONNX Runtime's entry point are loaded, so libraries of custom operators are not. The API is
+/// requested here already, because `ort` panics if a library does not provide it.
 ///
 /// # Errors
-/// A description of the fault, to follow its path.
+/// A message about the fault, to follow the library's path.
 pub(super) fn probe(path: &Path) -> Result<String, String> {
     let metadata = std::fs::metadata(path).map_err(|e| format!("cannot be read: {e}"))?;
     if !metadata.is_file() {
@@ -58,16 +59,16 @@ fn minor(version: &str) -> Option<u32> {
     parts.next()?.parse().ok()
 }
 
-/// The version that a library's `OrtGetApiBase` gives.
+/// Loads a library and returns the version that its API states.
 #[expect(
     unsafe_code,
     reason = "a dynamic library can be asked for its version in no other way"
 )]
 fn version_of(path: &Path) -> Result<String, String> {
-    // SAFETY: loading runs the library's initialisers. The file has the name of ONNX Runtime's library, or the user asked
-    // for it to be loaded; ONNX Runtime's initialisers have no preconditions.
+    // SAFETY: loading runs the library's initialisers. The file has the name of the ONNX Runtime library, or the user asked for it to be
+    // loaded; ONNX Runtime's initialisers have no preconditions.
     let library = unsafe { Library::new(path) }.map_err(|e| {
-        // The loader's message is in the source; the error itself states only that loading failed.
+        // The loader's message is in the source of the error.
         let reason = e
             .source()
             .map_or_else(|| e.to_string(), ToString::to_string);
@@ -94,7 +95,7 @@ fn version_of(path: &Path) -> Result<String, String> {
             (base.GetApi)(ort::sys::ORT_API_VERSION),
         )
     };
-    // An older library gives no API either; the caller's error about its version is clearer.
+    // For a library that is too old, the caller's error about its version is clearer.
     if api.is_null() && minor(&version).is_none_or(|minor| minor >= OLDEST) {
         return Err(format!(
             "is version {version} but does not provide API {OLDEST}"
@@ -124,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn versions_are_read() {
+    fn minor_versions_are_parsed() {
         assert_eq!(minor("1.31.1"), Some(31));
         assert_eq!(minor("1.17.0-dev"), Some(17));
         for wrong in ["", "1", "2.1.0", "1.x", "one"] {
@@ -133,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_is_not_a_library_is_refused() {
+    fn files_that_are_not_libraries_are_refused() {
         let folder = tempfile::tempdir().unwrap();
         let text = folder.path().join("libonnxruntime.so");
         std::fs::write(&text, "not a library").unwrap();
@@ -149,7 +150,7 @@ mod tests {
 
     #[cfg(target_os = "linux")]
     #[test]
-    fn another_library_is_refused() {
+    fn other_libraries_are_refused() {
         let loaded = std::fs::read_to_string("/proc/self/maps").unwrap();
         let libc = loaded
             .lines()

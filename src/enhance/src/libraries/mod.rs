@@ -1,4 +1,4 @@
-//! ONNX Runtime's library: its search, installation, check and opening, and the thread on which it works.
+//! The ONNX Runtime library: search, installation, check, loading, and the thread on which it runs.
 
 mod install;
 mod library;
@@ -10,4 +10,4 @@ mod search;
 
 pub(super) use library::PINNED;
 pub use runtime::{Install, Runtime, RuntimeSearch, disable_telemetry};
-pub(super) use runtime_thread::{Ended, JobLimits};
+pub(super) use runtime_thread::{JobEnd, JobLimits};

@@ -1,8 +1,8 @@
-//! Receipt of the library that this program installed: [`Receipt`].
+//! Integrity check of the installed library with a receipt: [`check`].
 //!
-//! The header of a library shows that it is whole ([`super::library_file`]), not that no byte of it has changed. So the
-//! SHA-256 of the installed library stands in a file beside it, with its size and its time of modification. The library is
-//! hashed again (29 MB) only if one of the two differs from the receipt.
+//! The header of a library shows that it is complete ([`super::library_file`]), but not that its bytes are unchanged. So a file next to
+//! the installed library records its SHA-256, size and time of modification. The library (29 MB) is hashed again only if size or time
+//! differ from this receipt.
 
 use std::fs::{self, File};
 use std::io::{self, Read};
@@ -19,7 +19,7 @@ pub(super) struct Receipt {
     sha256: String,
     /// Size of the library in bytes.
     size: u64,
-    /// Time of its last modification, in nanoseconds since 1970; `None` if the system does not tell it.
+    /// Time of the last modification, in nanoseconds since 1970; `None` if the system does not record it.
     modified: Option<String>,
 }
 
@@ -31,40 +31,45 @@ fn path_for(library: &Path) -> PathBuf {
 }
 
 impl Receipt {
-    /// Receipt of a library with the given SHA-256, by the size and time that its file has now.
+    /// Receipt for a library with this SHA-256 and the present size and time of its file.
     fn for_library(library: &Path, sha256: String) -> io::Result<Self> {
         let metadata = fs::metadata(library)?;
-        let modified = metadata.modified().ok();
-        let since_1970 = modified.and_then(|time| time.duration_since(UNIX_EPOCH).ok());
         Ok(Self {
             sha256,
             size: metadata.len(),
-            modified: since_1970.map(|time| time.as_nanos().to_string()),
+            modified: metadata
+                .modified()
+                .ok()
+                .and_then(|time| time.duration_since(UNIX_EPOCH).ok())
+                .map(|since_1970| since_1970.as_nanos().to_string()),
         })
     }
 
-    /// Writes the receipt beside its library. Where that is impossible, the library is hashed at each start.
+    /// Writes the receipt next to its library. If that fails, the library is hashed at each start.
     fn write(&self, library: &Path) {
-        let written = toml::to_string(self).map_err(io::Error::other);
-        if let Err(e) = written.and_then(|text| fs::write(path_for(library), text)) {
+        let result = toml::to_string(self)
+            .map_err(io::Error::other)
+            .and_then(|text| fs::write(path_for(library), text));
+        if let Err(e) = result {
             tracing::debug!("{} has no receipt: {e}", library.display());
         }
     }
 }
 
-/// Checks that an installed library has the given SHA-256, and writes its receipt if it has changed or is missing.
+/// Checks that an installed library has this SHA-256, and writes a missing or outdated receipt.
 ///
 /// # Errors
-/// A description of the fault, to follow its path.
+/// A message about the fault, to follow the library's path.
 pub(super) fn check(library: &Path, sha256: &str) -> Result<(), String> {
-    let unreadable = |e: io::Error| format!("cannot be read: {e}");
-    let expected = Receipt::for_library(library, sha256.to_owned()).map_err(unreadable)?;
-    let stored = fs::read_to_string(path_for(library)).ok();
-    let stored: Option<Receipt> = stored.and_then(|text| toml::from_str(&text).ok());
+    let expected = Receipt::for_library(library, sha256.to_owned())
+        .map_err(|e| format!("cannot be read: {e}"))?;
+    let stored: Option<Receipt> = fs::read_to_string(path_for(library))
+        .ok()
+        .and_then(|text| toml::from_str(&text).ok());
     if stored.as_ref() == Some(&expected) {
         return Ok(());
     }
-    let found = hash(library).map_err(unreadable)?;
+    let found = hash(library).map_err(|e| format!("cannot be read: {e}"))?;
     if found != sha256 {
         return Err(format!(
             "has changed since its installation: its SHA-256 is {found} instead of {sha256}"
@@ -98,10 +103,19 @@ pub(super) fn hex(bytes: &[u8]) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::time::SystemTime;
+
     use super::*;
 
+    /// Writes a library and sets the time of its modification.
+    fn write_at(library: &Path, content: &[u8], time: SystemTime) {
+        fs::write(library, content).unwrap();
+        let file = File::options().write(true).open(library).unwrap();
+        file.set_modified(time).unwrap();
+    }
+
     #[test]
-    fn a_changed_library_is_noticed_and_an_unchanged_one_is_hashed_once() {
+    fn library_is_hashed_again_only_if_size_or_time_differ() {
         let folder = tempfile::tempdir().unwrap();
         let library = folder.path().join("libonnxruntime.so.1.31.1");
         fs::write(&library, [7; 1000]).unwrap();
@@ -112,32 +126,25 @@ mod tests {
             receipt.contains(&sha256) && receipt.contains("1000"),
             "{receipt}"
         );
-        // With the size and time of the receipt it is not hashed: another byte goes unnoticed.
+        // Other bytes go unnoticed while size and time match the receipt.
         let time = fs::metadata(&library).unwrap().modified().unwrap();
-        let set = |content: &[u8]| {
-            fs::write(&library, content).unwrap();
-            let file = File::options().write(true).open(&library).unwrap();
-            file.set_modified(time).unwrap();
-        };
-        set(&[8; 1000]);
+        write_at(&library, &[8; 1000], time);
         assert_eq!(check(&library, &sha256), Ok(()));
-        set(&[8; 999]);
+        write_at(&library, &[8; 999], time);
         assert!(
             check(&library, &sha256)
                 .unwrap_err()
                 .contains("has changed")
         );
-        set(&[7; 1000]);
         let later = time + std::time::Duration::from_secs(9);
-        let file = File::options().write(true).open(&library).unwrap();
-        file.set_modified(later).unwrap();
-        // Only the time differs: hashed, and written down with the new time.
+        write_at(&library, &[7; 1000], later);
+        // If only the time differs, the receipt is updated.
         assert_eq!(check(&library, &sha256), Ok(()));
         assert_ne!(fs::read_to_string(path_for(&library)).unwrap(), receipt);
     }
 
     #[test]
-    fn a_broken_receipt_counts_as_none() {
+    fn invalid_receipt_counts_as_missing() {
         let folder = tempfile::tempdir().unwrap();
         let library = folder.path().join("library");
         fs::write(&library, "library").unwrap();

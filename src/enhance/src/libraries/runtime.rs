@@ -6,6 +6,7 @@
 //! of the process and written an identifier to the user's cache folder (seen with 1.31.1 on Linux). The environment variable
 //! [`TELEMETRY_SWITCH`] takes effect earlier, so programs must call [`disable_telemetry`] first.
 
+use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -17,7 +18,7 @@ use darkqa_ground::error::{Error, Result};
 use super::install::{Pin, check_installed, install};
 use super::library::{OLDEST, PINNED, probe};
 use super::runtime_thread::RuntimeThread;
-use super::search::{LibraryPlace, Surroundings};
+use super::search::{LibraryPlace, SearchFolders};
 
 /// Whether the library may be installed if it is not found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -94,7 +95,7 @@ impl RuntimeSearch {
                     place,
                 }
             }
-            None => find(&Surroundings::from_this_process(), self.install)?,
+            None => find(&SearchFolders::from_this_process(), self.install)?,
         };
         let runtime = Runtime::start(found)?;
         Ok(open.insert(runtime).clone())
@@ -105,9 +106,8 @@ impl RuntimeSearch {
     /// # Errors
     /// If `self.library` is another library than the open one.
     fn check_same(&self, runtime: &Runtime) -> Result<Runtime> {
-        let resolved = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
         match &self.library {
-            Some(path) if resolved(path) != resolved(runtime.path()) => Err(unusable_library(
+            Some(path) if resolve(path) != resolve(runtime.path()) => Err(unusable_library(
                 path,
                 &format!(
                     "cannot be loaded, because this process has already loaded {}",
@@ -117,6 +117,11 @@ impl RuntimeSearch {
             _ => Ok(runtime.clone()),
         }
     }
+}
+
+/// The path without links; unchanged if the file does not exist.
+fn resolve(path: &Path) -> PathBuf {
+    path.canonicalize().unwrap_or_else(|_| path.to_owned())
 }
 
 /// A usable library that is not open yet.
@@ -129,9 +134,9 @@ struct FoundLibrary {
 }
 
 /// Returns the first usable library of the candidates; otherwise installs one if allowed.
-fn find(surroundings: &Surroundings, policy: Install) -> Result<FoundLibrary> {
+fn find(folders: &SearchFolders, policy: Install) -> Result<FoundLibrary> {
     let mut rejected = Vec::new();
-    for (place, path) in surroundings.candidates() {
+    for (place, path) in folders.candidates() {
         match check(place, &path) {
             Ok(version) => {
                 let place = place.to_string();
@@ -144,7 +149,7 @@ fn find(surroundings: &Surroundings, policy: Install) -> Result<FoundLibrary> {
             Err(problem) if place == LibraryPlace::Cache && policy == Install::Allowed => {
                 rejected.push(format!("{} {problem}", path.display()));
                 // Reinstall a broken library in the cache: a later candidate may have another version.
-                match install_into_cache(surroundings, &rejected) {
+                match install_into_cache(folders, &rejected) {
                     Ok(found) => return Ok(found),
                     Err(problem) => tracing::warn!("ONNX Runtime cannot be reinstalled: {problem}"),
                 }
@@ -155,18 +160,13 @@ fn find(surroundings: &Surroundings, policy: Install) -> Result<FoundLibrary> {
             }
         }
     }
-    rejected.extend(
-        surroundings
-            .packages_without_library()
-            .iter()
-            .map(|folder| {
-                let folder = folder.display();
-                format!("{folder} has no library; packages since version 1.19 have one")
-            }),
-    );
+    rejected.extend(folders.packages_without_library().iter().map(|folder| {
+        let folder = folder.display();
+        format!("{folder} has no library; packages since version 1.19 have one")
+    }));
     let installed = match policy {
         Install::Offline => Err("--llie-options offline forbids installing it".to_owned()),
-        Install::Allowed => install_into_cache(surroundings, &rejected),
+        Install::Allowed => install_into_cache(folders, &rejected),
     };
     installed.map_err(|problem| Error::Runtime(not_found_message(&problem, &rejected)))
 }
@@ -175,7 +175,7 @@ fn find(surroundings: &Surroundings, policy: Install) -> Result<FoundLibrary> {
 fn check(place: LibraryPlace, path: &Path) -> Result<String, String> {
     if place == LibraryPlace::Cache
         && let Some(pin) = Pin::for_this_platform()
-        && pin.is_for(path)
+        && pin.matches_name(path)
     {
         check_installed(path, pin)?;
     }
@@ -184,7 +184,7 @@ fn check(place: LibraryPlace, path: &Path) -> Result<String, String> {
 
 /// Installs the pinned library into the cache.
 fn install_into_cache(
-    surroundings: &Surroundings,
+    folders: &SearchFolders,
     rejected: &[String],
 ) -> Result<FoundLibrary, String> {
     let pin = Pin::for_this_platform().ok_or_else(|| {
@@ -194,7 +194,7 @@ fn install_into_cache(
             std::env::consts::ARCH
         )
     })?;
-    let folder = surroundings.installed().ok_or_else(|| {
+    let folder = folders.cached_library_folder().ok_or_else(|| {
         let variables = match std::env::consts::OS {
             "windows" => "LOCALAPPDATA is not set",
             "macos" => "HOME is not set",
@@ -241,6 +241,10 @@ fn unusable_library(path: &Path, problem: &str) -> Error {
     ))
 }
 
+fn start_error(path: &Path, error: impl fmt::Display) -> Error {
+    Error::Runtime(format!("{}: {error}", path.display()))
+}
+
 impl Runtime {
     /// Loads a library that [`probe`] accepted, and starts its thread.
     fn start(found: FoundLibrary) -> Result<Self> {
@@ -249,7 +253,6 @@ impl Runtime {
             version,
             place,
         } = found;
-        let fault = |e: &dyn std::error::Error| Error::Runtime(format!("{}: {e}", path.display()));
         if std::env::var_os(TELEMETRY_SWITCH).is_none_or(|value| value != "1") {
             tracing::warn!(
                 "ONNX Runtime may report its use to Microsoft; set {TELEMETRY_SWITCH}=1 in the environment to forbid it"
@@ -262,13 +265,13 @@ impl Runtime {
             }
         });
         let environment = ort::init_from(&path)
-            .map_err(|e| fault(&e))?
+            .map_err(|e| start_error(&path, e))?
             .with_telemetry(false)
             .with_logger(logger)
             .build()
-            .map_err(|e| fault(&e))?;
+            .map_err(|e| start_error(&path, e))?;
         environment.set_log_level(LogLevel::Warning);
-        let thread = RuntimeThread::start().map_err(|e| fault(&e))?;
+        let thread = RuntimeThread::start().map_err(|e| start_error(&path, e))?;
         tracing::debug!("ONNX Runtime {version} from {}", path.display());
         Ok(Self(Arc::new(OpenRuntime {
             path,
@@ -283,9 +286,12 @@ impl Runtime {
     ///
     /// The first thread starts the second one, which on Linux then inherits the CPU setting that treats subnormal numbers as zero. On
     /// other systems, subnormal numbers may slow the second thread down, but its results have the same bytes.
-    pub(crate) fn beside(&self) -> Result<Self> {
-        let thread = self.0.thread.run(RuntimeThread::start)?;
-        let thread = thread.map_err(|e| Error::Runtime(e.to_string()))?;
+    pub(crate) fn with_new_thread(&self) -> Result<Self> {
+        let thread = self
+            .0
+            .thread
+            .run(RuntimeThread::start)?
+            .map_err(|e| Error::Runtime(e.to_string()))?;
         Ok(Self(Arc::new(OpenRuntime {
             path: self.0.path.clone(),
             version: self.0.version.clone(),
@@ -330,13 +336,11 @@ mod tests {
     fn missing_library_message_lists_remedies() {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("libonnxruntime.so"), "text").unwrap();
-        let surroundings = Surroundings {
+        let folders = SearchFolders {
             system: vec![folder.path().to_owned()],
-            ..Surroundings::default()
+            ..SearchFolders::default()
         };
-        let message = find(&surroundings, Install::Offline)
-            .unwrap_err()
-            .to_string();
+        let message = find(&folders, Install::Offline).unwrap_err().to_string();
         for part in [
             "--llie-options offline",
             "--llie-options ort-lib",
@@ -351,7 +355,7 @@ mod tests {
 
     #[test]
     fn missing_cache_folder_is_an_error() {
-        let error = find(&Surroundings::default(), Install::Allowed).unwrap_err();
+        let error = find(&SearchFolders::default(), Install::Allowed).unwrap_err();
         let message = error.to_string();
         assert!(message.contains("no cache folder"), "{message}");
     }

@@ -1,4 +1,4 @@
-//! Search for ONNX Runtime's library on this machine: [`Surroundings::candidates`].
+//! Search for the ONNX Runtime library on this machine: [`SearchFolders::candidates`].
 
 use std::cmp::Reverse;
 use std::collections::HashSet;
@@ -8,11 +8,10 @@ use std::path::{Path, PathBuf};
 
 use super::library::{PINNED, is_library_name};
 
-/// Folders and variables of the process that decide where a library is searched.
+/// Folders of this process that are searched for a library, directly or in their subfolders.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Surroundings {
-    /// Folder of the running program, without links: a link to the program may stand anywhere, its environment is where the
-    /// program itself is.
+pub(super) struct SearchFolders {
+    /// Folder of the running program, with links resolved, so that its Python environment is found from a link elsewhere.
     pub(super) program: Option<PathBuf>,
     /// Cache folder of the user.
     pub(super) cache: Option<PathBuf>,
@@ -26,7 +25,7 @@ pub(super) struct Surroundings {
     pub(super) system: Vec<PathBuf>,
 }
 
-/// Where a library was found, in the order of the search.
+/// Place in which a library is searched, in the order of the search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum LibraryPlace {
     /// The folder of the program.
@@ -42,8 +41,7 @@ pub(super) enum LibraryPlace {
 }
 
 impl LibraryPlace {
-    /// All places, in the order of the search. The library installed with the program comes first, so that a job on a cluster needs no
-    /// setting.
+    /// All places, in the order of the search. The folders of the program come first, so that jobs on a cluster need no setting.
     pub(super) const ALL: [Self; 5] = [
         Self::Program,
         Self::Environment,
@@ -65,52 +63,42 @@ impl fmt::Display for LibraryPlace {
     }
 }
 
-impl Surroundings {
-    /// The surroundings of this process.
+impl SearchFolders {
+    /// Search folders from the environment variables of this process.
     pub(super) fn from_this_process() -> Self {
-        let folder = |name| {
-            env::var_os(name)
-                .map(PathBuf::from)
-                .filter(|p| p.is_absolute())
-        };
-        let folders = |name| -> Vec<PathBuf> {
-            env::var_os(name)
-                .map(|value| env::split_paths(&value).collect())
-                .unwrap_or_default()
-        };
-        let home = folder("HOME");
+        let home = folder_variable("HOME");
         let cache = match consts::OS {
-            "windows" => folder("LOCALAPPDATA"),
+            "windows" => folder_variable("LOCALAPPDATA"),
             "macos" => home.as_ref().map(|home| home.join("Library/Caches")),
-            _ => folder("XDG_CACHE_HOME").or_else(|| home.as_ref().map(|home| home.join(".cache"))),
+            _ => folder_variable("XDG_CACHE_HOME")
+                .or_else(|| home.as_ref().map(|home| home.join(".cache"))),
         };
-        let mut system = folders(match consts::OS {
+        let mut system = path_variable(match consts::OS {
             "macos" => "DYLD_LIBRARY_PATH",
             _ => "LD_LIBRARY_PATH",
         });
         system.extend(system_folders());
         Self {
-            // macOS gives the link that was called, Linux the program itself.
+            // On macOS, `current_exe` can return a link.
             program: env::current_exe()
                 .and_then(|program| program.canonicalize())
                 .ok()
                 .and_then(|program| program.parent().map(Path::to_owned)),
             cache,
-            virtual_env: folder("VIRTUAL_ENV"),
-            path: folders("PATH"),
+            virtual_env: folder_variable("VIRTUAL_ENV"),
+            path: path_variable("PATH"),
             home,
             system,
         }
     }
 
-    /// Folder of the cache for a library of the pinned version; `None` if there is no cache folder.
-    pub(super) fn installed(&self) -> Option<PathBuf> {
+    /// Folder for the library of the pinned version in the user's cache; `None` without a cache folder.
+    pub(super) fn cached_library_folder(&self) -> Option<PathBuf> {
         let cache = self.cache.as_ref()?;
         Some(cache.join("darkqa-eval").join("onnxruntime").join(PINNED))
     }
 
-    /// Files with the library's name, each with where it was found, in the order in which they are tried: that of
-    /// [`LibraryPlace`].
+    /// Files with the library's name, each with its place, in the order in which they are tried.
     pub(super) fn candidates(&self) -> Vec<(LibraryPlace, PathBuf)> {
         let mut seen = HashSet::new();
         LibraryPlace::ALL
@@ -123,16 +111,16 @@ impl Surroundings {
                 })
             })
             .filter(|(_, path)| {
-                // Several names often link to one library.
+                // One library often has several names, which are links.
                 seen.insert(path.canonicalize().unwrap_or_else(|_| path.clone()))
             })
             .collect()
     }
 
-    /// The Python packages of ONNX Runtime that hold no library: those before 1.19, where it is a part of the Python module.
+    /// Folders of Python packages of ONNX Runtime without a separate library. Before version 1.19, the library is part of the Python
+    /// module.
     pub(super) fn packages_without_library(&self) -> Vec<PathBuf> {
-        let places = [LibraryPlace::Environment, LibraryPlace::Python];
-        let mut empty: Vec<PathBuf> = places
+        let mut empty: Vec<PathBuf> = [LibraryPlace::Environment, LibraryPlace::Python]
             .into_iter()
             .flat_map(|place| self.folders(place))
             .filter(|folder| libraries_in(folder).is_empty())
@@ -141,20 +129,21 @@ impl Surroundings {
         empty
     }
 
-    /// The folders of a place.
+    /// Folders that are searched in a place.
     fn folders(&self, place: LibraryPlace) -> Vec<PathBuf> {
         match place {
             LibraryPlace::Program => self.program.iter().cloned().collect(),
-            LibraryPlace::Environment => {
-                self.program.as_deref().map_or_else(Vec::new, own_packages)
-            }
-            LibraryPlace::Cache => self.installed().into_iter().collect(),
+            LibraryPlace::Environment => self
+                .program
+                .as_deref()
+                .map_or_else(Vec::new, packages_of_program),
+            LibraryPlace::Cache => self.cached_library_folder().into_iter().collect(),
             LibraryPlace::Python => self.python_packages(),
             LibraryPlace::System => self.system.clone(),
         }
     }
 
-    /// The `onnxruntime/capi` folders of the active Python environment and of those on `PATH`; no Python is run.
+    /// The `onnxruntime/capi` folders of the active Python environment and of those on `PATH`, found without running Python.
     fn python_packages(&self) -> Vec<PathBuf> {
         let mut prefixes: Vec<PathBuf> = self.virtual_env.iter().cloned().collect();
         for folder in &self.path {
@@ -163,10 +152,10 @@ impl Surroundings {
                 if !python.is_file() {
                     continue;
                 }
-                // The Python of a virtual environment is a link to the one it was created from.
+                // The Python of a virtual environment is a link to that of the base installation.
                 let target = python.canonicalize().unwrap_or_else(|_| python.clone());
                 for python in [python, target] {
-                    // On Windows it is at the top of an installation, or in its `Scripts`.
+                    // On Windows, Python is at the top of an installation, or in its `Scripts`.
                     prefixes.extend(python.ancestors().skip(1).take(2).map(Path::to_owned));
                 }
             }
@@ -179,19 +168,33 @@ impl Surroundings {
     }
 }
 
-/// The `onnxruntime/capi` folders of the environment that the program is installed in: `P/bin/darkqa-eval` has its packages in
-/// `P/lib/python3.12/site-packages` (on Windows `P\Scripts` and `P\Lib\site-packages`), and beside `bin` after
-/// `pip install --target`. So an environment need not be active.
-fn own_packages(program: &Path) -> Vec<PathBuf> {
+/// Absolute folder in an environment variable; `None` if it is unset or relative.
+fn folder_variable(name: &str) -> Option<PathBuf> {
+    env::var_os(name)
+        .map(PathBuf::from)
+        .filter(|path| path.is_absolute())
+}
+
+/// Folders in an environment variable that lists several, such as `PATH`.
+fn path_variable(name: &str) -> Vec<PathBuf> {
+    env::var_os(name)
+        .map(|value| env::split_paths(&value).collect())
+        .unwrap_or_default()
+}
+
+/// The `onnxruntime/capi` folders of the environment in which the program is installed, active or not. For the program
+/// `P/bin/darkqa-eval`, packages are in `P/lib/python3.12/site-packages` (on Windows, `P\Scripts` and `P\Lib\site-packages`), or in `P`
+/// after `pip install --target`.
+fn packages_of_program(program: &Path) -> Vec<PathBuf> {
     let Some(prefix) = program.parent() else {
         return Vec::new();
     };
-    let target = prefix.join("onnxruntime").join("capi");
-    let target = target.is_dir().then_some(target);
-    packages_in(prefix).into_iter().chain(target).collect()
+    let mut packages = packages_in(prefix);
+    packages.extend(Some(prefix.join("onnxruntime").join("capi")).filter(|target| target.is_dir()));
+    packages
 }
 
-/// The `onnxruntime/capi` folders under one installation prefix, those of the newest version of Python first.
+/// The `onnxruntime/capi` folders under one installation prefix, for the newest version of Python first.
 fn packages_in(prefix: &Path) -> Vec<PathBuf> {
     let mut roots = vec![prefix.join("Lib")];
     for lib in ["lib", "lib64", "local/lib"] {
@@ -207,15 +210,17 @@ fn packages_in(prefix: &Path) -> Vec<PathBuf> {
         versions.sort();
         roots.extend(versions.into_iter().map(|(_, path)| path));
     }
-    let packages = ["site-packages", "dist-packages"];
     roots
         .iter()
-        .flat_map(|root| packages.map(|name| root.join(name).join("onnxruntime").join("capi")))
+        .flat_map(|root| {
+            ["site-packages", "dist-packages"]
+                .map(|name| root.join(name).join("onnxruntime").join("capi"))
+        })
         .filter(|folder| folder.is_dir())
         .collect()
 }
 
-/// Libraries in one folder, by the version in their names, the newest first, one without a version last.
+/// Libraries in one folder, sorted by the version in their names: newest first, without a version last.
 fn libraries_in(folder: &Path) -> Vec<PathBuf> {
     let mut found: Vec<(Reverse<Vec<u32>>, PathBuf)> = sorted_entries(folder)
         .into_iter()
@@ -242,9 +247,9 @@ fn sorted_entries(folder: &Path) -> Vec<PathBuf> {
     paths
 }
 
-/// Folders in which this operating system keeps its libraries.
+/// Library folders of this operating system.
 ///
-/// On Windows there are none: the library in `System32` belongs to Windows, and Microsoft asks others not to use it.
+/// None on Windows, because the library in `System32` is reserved for Windows itself.
 fn system_folders() -> Vec<PathBuf> {
     let folders: Vec<String> = match consts::OS {
         "windows" => Vec::new(),
@@ -274,8 +279,8 @@ mod tests {
         std::fs::write(path, "").unwrap();
     }
 
-    fn paths(surroundings: &Surroundings) -> Vec<PathBuf> {
-        surroundings
+    fn paths(folders: &SearchFolders) -> Vec<PathBuf> {
+        folders
             .candidates()
             .into_iter()
             .map(|(_, path)| path)
@@ -286,7 +291,6 @@ mod tests {
     fn candidates_come_in_order() {
         let root = tempfile::tempdir().unwrap();
         let root = root.path().canonicalize().unwrap();
-        let at = |name: &str| root.join(name);
         let expected: Vec<PathBuf> = [
             "env/bin/libonnxruntime.so.1.20.0",
             "env/bin/libonnxruntime.so",
@@ -300,26 +304,26 @@ mod tests {
             "home/.local/lib/python3.11/site-packages/onnxruntime/capi/libonnxruntime.so.1.19.0",
             "system/libonnxruntime.so.1.17.0",
         ]
-        .map(at)
+        .map(|name| root.join(name))
         .to_vec();
         for path in &expected {
             touch(path);
         }
-        touch(&at("system/libonnxruntime_providers_shared.so"));
-        touch(&at("usr/bin/python3"));
-        let surroundings = Surroundings {
-            program: Some(at("env/bin")),
-            cache: Some(at("cache")),
-            virtual_env: Some(at("venv")),
-            path: vec![at("missing"), at("usr/bin")],
-            home: Some(at("home")),
-            system: vec![at("system")],
+        touch(&root.join("system/libonnxruntime_providers_shared.so"));
+        touch(&root.join("usr/bin/python3"));
+        let folders = SearchFolders {
+            program: Some(root.join("env/bin")),
+            cache: Some(root.join("cache")),
+            virtual_env: Some(root.join("venv")),
+            path: vec![root.join("missing"), root.join("usr/bin")],
+            home: Some(root.join("home")),
+            system: vec![root.join("system")],
         };
-        assert_eq!(paths(&surroundings), expected);
+        assert_eq!(paths(&folders), expected);
     }
 
     #[test]
-    fn a_virtual_environment_on_the_path_is_searched_before_its_base() {
+    fn virtual_environment_is_searched_before_its_base() {
         let root = tempfile::tempdir().unwrap();
         let root = root.path().canonicalize().unwrap();
         let capi = "lib/python3.12/site-packages/onnxruntime/capi/libonnxruntime.so.1.31.1";
@@ -334,42 +338,42 @@ mod tests {
             root.join("venv/bin/python"),
         )
         .unwrap();
-        let surroundings = Surroundings {
+        let folders = SearchFolders {
             path: vec![root.join("venv/bin")],
-            ..Surroundings::default()
+            ..SearchFolders::default()
         };
-        assert_eq!(paths(&surroundings), expected);
+        assert_eq!(paths(&folders), expected);
     }
 
     #[test]
-    fn a_package_without_a_library_is_named() {
+    fn packages_without_a_library_are_listed() {
         let root = tempfile::tempdir().unwrap();
         let capi = root
             .path()
             .join("lib/python3.12/site-packages/onnxruntime/capi");
         touch(&capi.join("onnxruntime_pybind11_state.so"));
-        let surroundings = Surroundings {
+        let folders = SearchFolders {
             program: Some(root.path().join("bin")),
-            ..Surroundings::default()
+            ..SearchFolders::default()
         };
         assert_eq!(
-            surroundings.packages_without_library(),
+            folders.packages_without_library(),
             std::slice::from_ref(&capi)
         );
         touch(&capi.join("libonnxruntime.so.1.19.0"));
-        assert!(surroundings.packages_without_library().is_empty());
+        assert!(folders.packages_without_library().is_empty());
     }
 
     #[test]
-    fn one_library_under_two_names_is_tried_once() {
+    fn library_with_two_names_is_tried_once() {
         let root = tempfile::tempdir().unwrap();
         let library = root.path().join("libonnxruntime.so.1.31.1");
         touch(&library);
         std::os::unix::fs::symlink(&library, root.path().join("libonnxruntime.so.1")).unwrap();
-        let surroundings = Surroundings {
+        let folders = SearchFolders {
             system: vec![root.path().to_owned()],
-            ..Surroundings::default()
+            ..SearchFolders::default()
         };
-        assert_eq!(paths(&surroundings), [library]);
+        assert_eq!(paths(&folders), [library]);
     }
 }

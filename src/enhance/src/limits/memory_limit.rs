@@ -1,4 +1,4 @@
-//! Memory that an enhancer may take: [`MemoryLimit`].
+//! Limit of the process's memory while an enhancer runs: [`MemoryLimit`].
 
 use std::fmt;
 use std::str::FromStr;
@@ -6,16 +6,16 @@ use std::time::Duration;
 
 use super::memory::{available, resident};
 
-/// The most memory of this process while an enhancer runs (`--llie-options max-memory`), in bytes. On systems without Linux's `/proc` nothing
-/// is limited.
+/// Maximum memory of this process, in bytes, while an enhancer runs (`--llie-options max-memory`). Without Linux's `/proc`, memory is not
+/// limited.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct MemoryLimit(Option<u64>);
 
-/// Share of the memory that is free at the start which an enhancer may take by default; chosen: the rest is for what else runs.
-const SHARE: f64 = 0.8;
+/// Share of the memory free at the start that an enhancer may take by default; chosen, to leave the rest to other programs.
+const FREE_SHARE: f64 = 0.8;
 
-/// Time between two looks at the memory; chosen. A process gets some 1 GB in that time, and a look costs some 20 µs.
-const LOOK: Duration = Duration::from_millis(100);
+/// Interval between checks of the memory; chosen. A process can allocate about 1 GB in that time; a check takes about 20 µs.
+const POLL_INTERVAL: Duration = Duration::from_millis(100);
 
 const GIGABYTE: f64 = 1e9;
 
@@ -23,21 +23,28 @@ impl MemoryLimit {
     /// No limit.
     pub const NONE: Self = Self(None);
 
-    /// Memory of the process now, plus four fifths of the free memory.
+    /// Present memory of the process plus 80 % of the free memory.
     #[must_use]
     pub fn automatic() -> Self {
-        let now = resident().zip(available());
-        Self(now.map(|(resident, free)| resident + (SHARE * free as f64) as u64))
+        match (resident(), available()) {
+            (Some(resident), Some(free)) => {
+                Self(Some(resident + (FREE_SHARE * free as f64) as u64))
+            }
+            _ => Self::NONE,
+        }
     }
 
-    /// The time after which to look at the memory again; `None` without a limit.
-    pub(crate) fn look(self) -> Option<Duration> {
-        self.0.map(|_| LOOK)
+    /// Interval after which to check the memory again; `None` without a limit.
+    pub(crate) fn poll_interval(self) -> Option<Duration> {
+        self.0.map(|_| POLL_INTERVAL)
     }
 
-    /// Whether the process takes more.
+    /// True if the process takes more memory than the limit.
     pub(crate) fn is_exceeded(self) -> bool {
-        self.0.zip(resident()).is_some_and(|(most, now)| now > most)
+        match (self.0, resident()) {
+            (Some(limit), Some(resident)) => resident > limit,
+            _ => false,
+        }
     }
 }
 
@@ -85,7 +92,7 @@ mod tests {
 
     #[cfg(target_os = "linux")]
     #[test]
-    fn the_process_is_held_against_the_limit() {
+    fn limit_is_compared_with_the_process() {
         assert!("0.000001".parse::<MemoryLimit>().unwrap().is_exceeded());
         assert!(!"1000000".parse::<MemoryLimit>().unwrap().is_exceeded());
         assert!(!MemoryLimit::NONE.is_exceeded());

@@ -1,4 +1,4 @@
-//! Time that one image may take: [`TimeLimit`], [`ImageClock`].
+//! Time limit for one image: [`TimeLimit`], [`ImageClock`].
 
 use std::fmt;
 use std::str::FromStr;
@@ -6,35 +6,35 @@ use std::time::Duration;
 
 use darkqa_ground::types::flags::seconds;
 
-/// Longest time that one image may take (`--llie-options timeout`).
+/// Time limit for one image (`--llie-options timeout`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TimeLimit(Option<Duration>);
 
-/// Images in a row that may take too much time or memory before the enhancer is not run any more; chosen.
-pub(crate) const MOST_ENDED: usize = 3;
+/// Number of images in a row that exceed a limit of time or memory after which the enhancer is not run any more; chosen.
+pub(crate) const MAX_CONSECUTIVE_OVERRUNS: usize = 3;
 
-/// Time, as a multiple of the limit, after which a run that was told to end counts as stuck; chosen. ONNX Runtime ends a run
-/// only between two nodes of its graph.
+/// Multiple of the time limit after which a stopped run counts as stuck; chosen. ONNX Runtime ends a run only between two nodes of its
+/// graph.
 pub(crate) const PATIENCE: u32 = 10;
 
 impl TimeLimit {
     /// No limit.
     pub const NONE: Self = Self(None);
 
-    /// A limit in seconds; 0 is none.
+    /// A limit; a duration of 0 means no limit.
     #[must_use]
     pub fn new(limit: Duration) -> Self {
         Self((!limit.is_zero()).then_some(limit))
     }
 
-    /// The limit; `None` for none.
+    /// The limit as a duration; `None` for no limit.
     pub(crate) fn get(self) -> Option<Duration> {
         self.0
     }
 }
 
 impl Default for TimeLimit {
-    /// Ten minutes; chosen.
+    /// A limit of ten minutes; chosen.
     fn default() -> Self {
         Self(Some(Duration::from_mins(10)))
     }
@@ -57,7 +57,7 @@ impl FromStr for TimeLimit {
     }
 }
 
-/// Time that is left for the runs of one image.
+/// Time used by the runs of one image, with its limit.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct ImageClock {
     limit: TimeLimit,
@@ -65,7 +65,7 @@ pub(crate) struct ImageClock {
 }
 
 impl ImageClock {
-    /// A clock for one image.
+    /// A clock at the start of an image.
     pub(crate) fn new(limit: TimeLimit) -> Self {
         Self {
             limit,
@@ -73,27 +73,27 @@ impl ImageClock {
         }
     }
 
-    /// Time that is left; `None` without a limit.
-    pub(crate) fn left(self) -> Option<Duration> {
+    /// Remaining time; `None` without a limit.
+    pub(crate) fn remaining(self) -> Option<Duration> {
         Some(self.limit.get()?.saturating_sub(self.used))
     }
 
-    /// The limit of the whole image.
+    /// Time limit for the whole image.
     pub(crate) fn time_limit(self) -> TimeLimit {
         self.limit
     }
 
-    /// The limit of the whole image; `None` for none.
+    /// Time limit for the whole image as a duration; `None` for no limit.
     pub(crate) fn limit(self) -> Option<Duration> {
         self.limit.get()
     }
 
-    /// Counts the time of one run.
+    /// Adds the time of one run.
     pub(crate) fn add(&mut self, time: Duration) {
         self.used += time;
     }
 
-    /// Sets the clock to the start of another image or trial.
+    /// Resets the clock for another image or trial.
     pub(crate) fn restart(&mut self) {
         self.used = Duration::ZERO;
     }
@@ -117,14 +117,14 @@ mod tests {
     }
 
     #[test]
-    fn the_runs_of_an_image_share_its_time() {
+    fn runs_of_an_image_share_its_time() {
         let mut clock = ImageClock::new("2".parse().unwrap());
         clock.add(Duration::from_millis(1500));
-        assert_eq!(clock.left(), Some(Duration::from_millis(500)));
+        assert_eq!(clock.remaining(), Some(Duration::from_millis(500)));
         clock.add(Duration::from_secs(9));
-        assert_eq!(clock.left(), Some(Duration::ZERO));
+        assert_eq!(clock.remaining(), Some(Duration::ZERO));
         clock.restart();
-        assert_eq!(clock.left(), Some(Duration::from_secs(2)));
-        assert_eq!(ImageClock::new(TimeLimit::NONE).left(), None);
+        assert_eq!(clock.remaining(), Some(Duration::from_secs(2)));
+        assert_eq!(ImageClock::new(TimeLimit::NONE).remaining(), None);
     }
 }

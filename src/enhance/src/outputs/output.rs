@@ -1,11 +1,11 @@
-//! Choice of the outputs of a graph that are the enhanced image, or from which it is made: [`Output`].
+//! Choice of the graph outputs that are the enhanced image or operands of its expression: [`Output`].
 
 use crate::conventions::sidecar::{ADD, OutputChoice};
 use crate::conventions::{Channels, ElementType, TensorLayout, preset};
 use crate::expressions::{ChannelSlice, Expression};
-use crate::graphs::{Dim, Port, list};
+use crate::graphs::{Dim, Port, format_ports};
 
-/// Names that exporters give the enhanced image if a model has other outputs too.
+/// Usual names of the enhanced image in models with several outputs.
 const IMAGE_NAMES: [&str; 8] = [
     "enhanced",
     "enhanced_image",
@@ -17,27 +17,27 @@ const IMAGE_NAMES: [&str; 8] = [
     "image",
 ];
 
-/// An output that is the enhanced image, or a name in the expression of it.
+/// Graph output that is the enhanced image, or an operand of its expression.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Output {
     /// Name, type and dimensions in the graph.
     pub(crate) port: Port,
-    /// Order of its dimensions; `None` if only a run shows it.
+    /// Order of the dimensions; `None` if it is known only after a run.
     pub(crate) layout: Option<TensorLayout>,
-    /// Numbers of channels that it may have.
+    /// Possible numbers of channels.
     pub(super) channels: Vec<usize>,
-    /// The channels that are read; `None` for all.
+    /// Channels that are used; `None` for all.
     pub(crate) slice: Option<ChannelSlice>,
-    /// Reason for the choice, for users; `stated` if sidecar or preset state it.
+    /// Reason for the choice, for users; `stated` if sidecar or preset name the output.
     pub(crate) reason: &'static str,
 }
 
 impl Output {
-    /// The image among the outputs: the stated one, the only one, else the one on which names and structure agree. `fits` tells whether an
-    /// output can be the image.
+    /// Chooses the image among the outputs: the stated one, else the only candidate, else the one on which name and structure agree.
+    /// `fits` is true if an output can be an image with the given number of channels.
     ///
     /// # Errors
-    /// The message follows the file's name.
+    /// If no output or several could be the image; the message follows the file's name.
     pub(crate) fn choose(
         outputs: &[Port],
         stated: Option<&OutputChoice>,
@@ -45,33 +45,34 @@ impl Output {
         fits: impl Fn(&Port, usize) -> bool,
     ) -> Result<Self, String> {
         if let Some(OutputChoice::Name(name)) = stated
-            && let Some((port, slice)) = sliced(outputs, name)
+            && let Some((port, slice)) = find_slice(outputs, name)
         {
             if slice.count() != channels.count() {
                 return Err(format!(
                     "MODEL.onnx.toml or the preset sets output = {name:?}, {} channels; expected {}",
                     slice.count(),
-                    channels.words()
+                    channels.description()
                 ));
             }
             return Self::from_slice(port, slice, fits);
         }
-        let fits_count = &fits;
-        let fits = |port: &Port| fits_count(port, channels.count());
-        let images = image_outputs(outputs, fits);
+        let images = candidate_images(outputs, |port| fits(port, channels.count()));
         let (index, reason) = match (images.as_slice(), stated) {
             ([only], None) => (*only, "the only output that can be the image"),
-            // An index may count the outputs of the authors' model. An export may have fewer.
+            // The index may refer to the authors' model, which can have more outputs than this export.
             ([only], Some(OutputChoice::Index(_))) if outputs.len() == 1 => {
                 (*only, "the only output")
             }
-            (_, Some(choice)) => (stated_output(outputs, choice, fits)?, "stated"),
-            ([], None) => return Err(no_image(outputs, channels, fits_count)),
-            (several, None) => match (by_name(outputs, several), by_structure(outputs)) {
+            (_, Some(choice)) => {
+                let index = stated_output(outputs, choice, |port| fits(port, channels.count()))?;
+                (index, "stated")
+            }
+            ([], None) => return Err(no_image_message(outputs, channels, fits)),
+            (several, None) => match (index_by_name(outputs, several), zero_dce_index(outputs)) {
                 (Some(name), None) => (name, "its name"),
                 (None, Some(structure)) => (structure, "the second of Zero-DCE's three outputs"),
                 (Some(name), Some(structure)) if name == structure => (name, "its name"),
-                _ => return Err(ambiguous(outputs)),
+                _ => return Err(ambiguous_message(outputs)),
             },
         };
         let port = outputs[index].clone();
@@ -84,11 +85,11 @@ impl Output {
         })
     }
 
-    /// The outputs that an expression of the image names, in its order.
+    /// Outputs named by the expression of the image, in its order.
     ///
     /// # Errors
-    /// If a name is neither an output nor `input`, or an output is no image of one or three channels.
-    pub(crate) fn named(
+    /// If a name is neither an output nor `input`, or an output is not an image of one or three channels.
+    pub(crate) fn for_expression(
         outputs: &[Port],
         image: &Expression,
         channels: Channels,
@@ -98,21 +99,24 @@ impl Output {
             Channels::Rgb => &[3, 1],
             Channels::Y => &[1],
         };
-        let names = outputs.iter().map(|port| port.name.as_str());
-        let known: Vec<&str> = names.chain([INPUT]).collect();
+        let known: Vec<&str> = outputs
+            .iter()
+            .map(|port| port.name.as_str())
+            .chain([INPUT])
+            .collect();
         let slices: Vec<&str> = image
             .names()
             .iter()
-            .filter(|name| sliced(outputs, name).is_some())
+            .filter(|name| find_slice(outputs, name).is_some())
             .map(String::as_str)
             .collect();
         let known_names = [&known[..], &slices].concat();
         image
             .check_names("image", &known_names)
-            .map_err(|problem| format!("{problem}; outputs: {}", list(outputs)))?;
+            .map_err(|problem| format!("{problem}; outputs: {}", format_ports(outputs)))?;
         let outputs: Vec<Self> = image.names().iter().filter(|name| *name != INPUT)
             .map(|name| {
-                if let Some((port, slice)) = sliced(outputs, name) {
+                if let Some((port, slice)) = find_slice(outputs, name) {
                     return Self::from_slice(port, slice, &fits);
                 }
                 let port = outputs.iter().find(|port| port.name == *name);
@@ -120,7 +124,7 @@ impl Output {
                     format!(
                         "image = \"{image}\" names output {name:?}, which is not an image of {}; outputs: {}",
                         if channels == [1] { "one channel (channels = \"y\")" } else { "one or three channels" },
-                        list(outputs)
+                        format_ports(outputs)
                     )
                 })?;
                 Ok(Self {
@@ -143,10 +147,10 @@ impl Output {
 }
 
 impl Output {
-    /// Some channels of an output.
+    /// Slice of an output's channels.
     ///
     /// # Errors
-    /// If it has fewer channels, or another size than the input.
+    /// If the output has fewer channels, or another size than the input.
     fn from_slice(
         port: &Port,
         slice: ChannelSlice,
@@ -173,23 +177,16 @@ impl Output {
     }
 }
 
-/// Indices of the outputs that can be the image: those whose dimensions the graph states, else those without stated dimensions.
-fn image_outputs(outputs: &[Port], fits: impl Fn(&Port) -> bool) -> Vec<usize> {
-    let fitting = |has_dims: bool| -> Vec<usize> {
-        (0..outputs.len())
-            .filter(|&i| outputs[i].dims.is_empty() != has_dims && fits(&outputs[i]))
-            .collect()
-    };
-    let shaped = fitting(true);
-    if shaped.is_empty() {
-        fitting(false)
-    } else {
-        shaped
-    }
+/// Indices of the outputs that can be the image. Outputs without declared dimensions count only if there are no others.
+fn candidate_images(outputs: &[Port], fits: impl Fn(&Port) -> bool) -> Vec<usize> {
+    let (shaped, shapeless): (Vec<usize>, Vec<usize>) = (0..outputs.len())
+        .filter(|&i| fits(&outputs[i]))
+        .partition(|&i| !outputs[i].dims.is_empty());
+    if shaped.is_empty() { shapeless } else { shaped }
 }
 
-/// The output and the channels that a name such as `x[4:7]` means; `None` if it means no channels of an output.
-fn sliced<'a>(outputs: &'a [Port], name: &str) -> Option<(&'a Port, ChannelSlice)> {
+/// Output and channels of a name such as `x[4:7]`; `None` if the name is not a slice of an output.
+fn find_slice<'a>(outputs: &'a [Port], name: &str) -> Option<(&'a Port, ChannelSlice)> {
     if outputs.iter().any(|port| port.name == name) {
         return None;
     }
@@ -198,8 +195,8 @@ fn sliced<'a>(outputs: &'a [Port], name: &str) -> Option<(&'a Port, ChannelSlice
     Some((port, slice))
 }
 
-/// A name as expressions write it, in backticks if needed.
-pub(crate) fn in_expression(name: &str) -> String {
+/// A name as written in expressions, in backticks if needed.
+pub(crate) fn expression_name(name: &str) -> String {
     if name
         .chars()
         .all(|c: char| c.is_ascii_alphanumeric() || c == '_')
@@ -211,34 +208,38 @@ pub(crate) fn in_expression(name: &str) -> String {
     }
 }
 
-/// The line of a sidecar for a light map that the input is divided by; `term` is its output as expressions write it.
+/// Sidecar line for a light map by which the input is divided; `term` is the output's name as written in expressions.
 pub(crate) fn light_map_line(term: &str) -> String {
     format!("image = \"clip(input / max({term}, 0.001), 0, 1)\"")
 }
 
-/// Why none of the outputs is the image, and what to state or export.
-fn no_image(outputs: &[Port], channels: Channels, fits: impl Fn(&Port, usize) -> bool) -> String {
-    let wide = |port: &&Port| {
-        port.channel_counts()
-            .into_iter()
-            .filter(|count| *count > 1 && *count != 3)
-            .find(|count| fits(port, *count))
-    };
+/// Message for a model without an image output, with the line to add or the export to change.
+fn no_image_message(
+    outputs: &[Port],
+    channels: Channels,
+    fits: impl Fn(&Port, usize) -> bool,
+) -> String {
     if channels == Channels::Rgb
-        && let Some((port, count)) = outputs.iter().find_map(|port| Some((port, wide(&port)?)))
+        && let Some((port, count)) = outputs.iter().find_map(|port| {
+            let count = port
+                .channel_counts()
+                .into_iter()
+                .find(|count| *count > 1 && *count != 3 && fits(port, *count))?;
+            Some((port, count))
+        })
     {
         let name = &port.name;
         return match count {
             4 => format!(
                 "gives {port}, 4 channels, but an image has 3; if the fourth is opacity, {ADD}: `output = \"{name}[0:3]\"`; if they are reflectance and light: `image = \"{0}[0:3] * {0}[3:4]\"`",
-                in_expression(name)
+                expression_name(name)
             ),
             6 => format!(
                 "gives {port}, 6 channels, but an image has 3; {ADD} the half that is the image: `output = \"{name}[0:3]\"` or `output = \"{name}[3:6]\"`"
             ),
             24 => format!(
                 "gives {port}, 24 channels, but an image has 3; if they are the curves of Zero-DCE, {ADD}: `image = \"curves(input, {0}[0:3], {0}[3:6], {0}[6:9], {0}[9:12], {0}[12:15], {0}[15:18], {0}[18:21], {0}[21:24])\"`",
-                in_expression(name)
+                expression_name(name)
             ),
             _ => format!(
                 "gives {port}, {count} channels, but an image has 3; {ADD} those that are the image (from 0, end excluded): `output = \"{name}[{}:{count}]\"`",
@@ -251,7 +252,7 @@ fn no_image(outputs: &[Port], channels: Channels, fits: impl Fn(&Port, usize) ->
     {
         return format!(
             "gives {port}, one channel, not an image; if it is a light map that the input is divided by, {ADD}: `{}`; if it is the enhanced luma, export it joined with the colours",
-            light_map_line(&in_expression(&port.name))
+            light_map_line(&expression_name(&port.name))
         );
     }
     if let [port] = outputs {
@@ -260,7 +261,7 @@ fn no_image(outputs: &[Port], channels: Channels, fits: impl Fn(&Port, usize) ->
                 "not a tensor of numbers; export it so that it gives one image as float32"
                     .to_owned(),
             ),
-            (element, _) if !element.is_read() => {
+            (element, _) if !element.is_output_type() => {
                 Some("an unsupported type; export it so that it gives float32 or uint8".to_owned())
             }
             (_, 1 | 2) => Some(
@@ -283,16 +284,16 @@ fn no_image(outputs: &[Port], channels: Channels, fits: impl Fn(&Port, usize) ->
     };
     format!(
         "has no output that is {what} of the input's size; outputs: {}",
-        list(outputs)
+        format_ports(outputs)
     )
 }
 
-/// Name of the dark image in an expression of the image.
+/// Name of the degraded image in the expression `image`.
 pub(super) const INPUT: &str = "input";
 
-/// Question to the user if the image among the outputs is unknown. Presets that know such a list are named.
-fn ambiguous(outputs: &[Port]) -> String {
-    let presets = preset::that_know(outputs);
+/// Message for a model with several possible image outputs, with the presets that list such outputs.
+fn ambiguous_message(outputs: &[Port]) -> String {
+    let presets = preset::with_outputs(outputs);
     let presets = match presets.as_slice() {
         [] => String::new(),
         names => {
@@ -304,11 +305,14 @@ fn ambiguous(outputs: &[Port]) -> String {
     };
     format!(
         "has several outputs that could be the image: {}; {ADD}: `output = \"NAME\"` or `output = INDEX` (from 0){presets}; `darkqa-eval enhance doctor` shows which are plausible",
-        list(outputs)
+        format_ports(outputs)
     )
 }
 
-/// Index of the stated output, which must exist and be able to be the image.
+/// Index of the stated output.
+///
+/// # Errors
+/// If the output does not exist or cannot be the image.
 fn stated_output(
     outputs: &[Port],
     choice: &OutputChoice,
@@ -325,28 +329,28 @@ fn stated_output(
     };
     Err(format!(
         "MODEL.onnx.toml or the preset sets {choice}, {problem}; outputs: {}",
-        list(outputs)
+        format_ports(outputs)
     ))
 }
 
-/// The only image output that has one of [`IMAGE_NAMES`].
+/// Index of the only candidate with one of [`IMAGE_NAMES`]; `None` if several have one.
 ///
-/// A name of the first output counts only if the others are named too: see [`Port::is_numbered`].
-fn by_name(outputs: &[Port], images: &[usize]) -> Option<usize> {
+/// The name of the first output counts only if the others are named too; see [`Port::is_numbered`].
+fn index_by_name(outputs: &[Port], images: &[usize]) -> Option<usize> {
     let mut matching = images
         .iter()
         .copied()
         .filter(|i: &usize| IMAGE_NAMES.contains(&outputs[*i].name.as_str()));
     let only = matching.next().filter(|_| matching.next().is_none())?;
-    let named_by_hand = only > 0 || !outputs.iter().any(Port::is_numbered);
-    named_by_hand.then_some(only)
+    let is_named_by_user = only > 0 || !outputs.iter().any(Port::is_numbered);
+    is_named_by_user.then_some(only)
 }
 
-/// Index of the second of Zero-DCE's three outputs, which is the image whatever their names are.
+/// Index of the image among Zero-DCE's three outputs, whatever their names; `None` for other outputs.
 ///
 /// `enhance_net_nopool.forward` of <https://github.com/Li-Chongyi/Zero-DCE> returns the image after four curves, the
 /// image after all eight, and the 8 × 3 = 24 channels of the curves themselves. No other published model has this shape.
-fn by_structure(outputs: &[Port]) -> Option<usize> {
+fn zero_dce_index(outputs: &[Port]) -> Option<usize> {
     let channels: Vec<Option<usize>> = outputs
         .iter()
         .map(|port| port.dims.get(1).and_then(Dim::known))

@@ -1,41 +1,41 @@
 //! Examination of a model with an unknown convention: [`Enhancer::examine`].
 //!
-//! The model runs on a few dark frames with each possible convention. If exactly one of them gives plausible images, it is proposed.
+//! The model runs on a few dark frames with each possible convention. If exactly one convention gives plausible images, it is proposed.
 
 mod proposal;
 
 use std::collections::BTreeSet;
 
 use super::expressions::{ExpressionTrial, OutputKind};
-use super::plausible::{Codes, Facts};
+use super::plausible::{Facts, UnclampedImage};
 use super::probe::{PairTrial, Probe};
 use super::probe_run::Trials;
 use super::range_pair::RangePair;
-use super::trial_images::made;
+use super::trial_images::run_frames;
 use crate::conventions::sidecar::{self, ADD, ModelSidecar, OutputChoice};
 use crate::conventions::{ChannelOrder, ValueScale};
 use crate::enhancer::Enhancer;
 use crate::graphs::Port;
-use crate::sizing::TakenSizes;
+use crate::sizing::AcceptedSizes;
 use darkqa_ground::error::Result;
 use darkqa_ground::types::Rgb;
-use proposal::{Found, propose};
+use proposal::{Proposal, propose};
 pub use proposal::{ProposedLine, Settled};
 
 /// Results of a model on dark frames, by convention.
 #[derive(Debug)]
 pub struct Examination {
-    /// The dark frames as they are fed.
+    /// The dark frames, in the size in which they are fed.
     pub frames: Vec<Rgb>,
-    /// The conventions that were tried.
+    /// Conventions to draw, each with its images.
     pub columns: Vec<ExaminedConvention>,
-    /// The lines of a sidecar that are proposed.
+    /// Proposed lines of a sidecar.
     pub proposal: Vec<ProposedLine>,
-    /// Why they are proposed, or why nothing is.
+    /// Reason for the proposal, or for its absence.
     pub conclusion: String,
     /// How the sizes of the frames were handled, or why the model failed.
     pub sizes: String,
-    /// Parts of the convention that the frames decide.
+    /// Whether exactly one convention is plausible.
     pub settled: Settled,
 }
 
@@ -44,11 +44,11 @@ pub struct Examination {
 pub enum ImageOutput {
     /// One output is the image.
     Known,
-    /// Several could be, and the first of them is read.
+    /// Several outputs could be the image; the first one is read.
     Unknown,
 }
 
-/// The images of one convention.
+/// Images of a model in one convention.
 #[derive(Debug)]
 pub struct ExaminedConvention {
     /// Heading that describes the convention.
@@ -64,22 +64,22 @@ pub struct ExaminedConvention {
 pub struct ExaminedImage {
     /// The image, clamped and rounded.
     pub image: Rgb,
-    /// Its figures before it was clamped.
+    /// Statistics of the image before clamping.
     pub facts: Facts,
     /// Flaw of the image; `None` if it is plausible.
     pub problem: Option<String>,
 }
 
 impl Enhancer {
-    /// Runs the model on dark frames with each convention that could be meant.
+    /// Runs the model on dark frames in each possible convention.
     ///
     /// # Errors
-    /// If it takes none of the sizes of the probe.
+    /// If the model accepts none of the sizes of the probe.
     pub fn examine(&mut self, dark: &[Rgb], image: ImageOutput) -> Result<Examination> {
         let sizes = self.try_sizes(dark);
         let order = self.other_order();
         let trials = self.trials_of_all(dark)?.ok_or_else(|| {
-            self.fault(format!(
+            self.error(format!(
                 "fails at 144 × 96, 160 × 120 and 128 × 128; {ADD} the sizes that it takes: `multiple = N` or `fixed = [WIDTH, HEIGHT]`"
             ))
         })?;
@@ -94,19 +94,20 @@ impl Enhancer {
             .map(|output| output.title.clone())
             .collect();
         let stated = self.stated_pair();
-        let is_plausible = |pair: &RangePair| probe.plausible().contains(pair);
         let mut found = match (image, stated) {
-            (ImageOutput::Unknown, _) => Found::no_output(&self.output_title(), &probe, &plausible),
-            (ImageOutput::Known, Some(pair)) if is_plausible(&pair) => Found::stated(pair),
+            (ImageOutput::Unknown, _) => {
+                Proposal::for_unknown_output(&self.output_title(), &probe, &plausible)
+            }
+            (ImageOutput::Known, Some(pair)) if probe.plausible().contains(&pair) => {
+                Proposal::for_stated(pair)
+            }
             (ImageOutput::Known, _) => propose(&probe, stated, &swapped, order),
         };
         if !found.lines.is_empty() {
             found.lines.extend(self.found_size());
         }
         if image == ImageOutput::Known {
-            found.mention(&plausible);
-        }
-        if image == ImageOutput::Known {
+            found.mention_outputs(&plausible);
             let kind = self.kind_by_endpoints(probe.best())?;
             if kind.is_some() || found.lines.is_empty() && probe.plausible().is_empty() {
                 let expressions = self.expressions(dark)?;
@@ -142,18 +143,18 @@ impl Enhancer {
             frames,
             columns,
             proposal: found.lines,
-            conclusion: sidecar::named(&found.conclusion, self.path()),
+            conclusion: sidecar::insert_sidecar_name(&found.conclusion, self.path()),
             sizes,
         })
     }
 
-    /// The order of the output's colours that is not stated.
+    /// Channel order of the output that is not the present one.
     fn other_order(&self) -> ChannelOrder {
         let stated = self.convention();
         swapped(stated.color_out.or(stated.color).unwrap_or_default())
     }
 
-    /// Runs the model on dark frames with all ranges, in the stated order of colours and in the other.
+    /// Runs the model on dark frames with all value ranges, in the present channel order of the output and in the other.
     fn trials_of_all(&self, dark: &[Rgb]) -> Result<Option<Trials<2>>> {
         let stated = self.convention().clone();
         let swapped = ModelSidecar {
@@ -163,14 +164,13 @@ impl Enhancer {
         self.trials(dark, [&stated, &swapped], [None; 2])
     }
 
-    /// The lines of the sidecar with which the images of dark frames are plausible, in a sentence; `None` if no lines are the
-    /// only ones.
+    /// Sentence with the only sidecar lines that make the images of dark frames plausible; `None` if no or several sets of lines do.
     pub(super) fn better_lines(&self, dark: &[Rgb]) -> Result<Option<String>> {
         let Some(trials) = self.trials_of_all(dark)? else {
             return Ok(None);
         };
         let [mut probe, mut swapped] = trials.probes;
-        // A pair is advised only if no frame speaks against it.
+        // A pair is advised only if all frames are plausible with it.
         for probe in [&mut probe, &mut swapped] {
             probe.leave_out_mixed();
         }
@@ -189,12 +189,12 @@ impl Enhancer {
         }))
     }
 
-    /// The output that is read, as a title.
+    /// Title that names the output that is read.
     fn output_title(&self) -> String {
         format!("output {:?}", self.graph().signature.outputs[0].port.name)
     }
 
-    /// The ranges that are stated; `None` if one is not.
+    /// The stated ranges of input and output; `None` if one of them is not stated.
     fn stated_pair(&self) -> Option<RangePair> {
         let [input, output] = self.stated_ranges();
         Some(RangePair {
@@ -203,7 +203,7 @@ impl Enhancer {
         })
     }
 
-    /// Runs the model on a frame of each size to find the sizes that it accepts. The images are not checked here.
+    /// Runs the model on one frame of each size, to find the sizes that it accepts. Returns a summary of the sizes, or the error.
     fn try_sizes(&mut self, frames: &[Rgb]) -> String {
         let mut tried = BTreeSet::new();
         for frame in frames {
@@ -216,17 +216,17 @@ impl Enhancer {
         self.usage().note().sizes
     }
 
-    /// The line for the size that was found by trial.
+    /// Sidecar line for the accepted sizes, if they were found by trial.
     fn found_size(&self) -> Option<ProposedLine> {
         let line = match self.found_sizes()? {
-            TakenSizes::Multiple(multiple) => format!("multiple = {multiple}"),
-            TakenSizes::Traced([height, width]) => format!("fixed = [{width}, {height}]"),
+            AcceptedSizes::Multiple(multiple) => format!("multiple = {multiple}"),
+            AcceptedSizes::Traced([height, width]) => format!("fixed = [{width}, {height}]"),
         };
         let reason = "found by trial: it fails at other sizes".to_owned();
         Some(ProposedLine { line, reason })
     }
 
-    /// The plausible images that are made of input and output.
+    /// Expressions of input and output that give plausible images.
     fn expressions(&self, dark: &[Rgb]) -> Result<Vec<ExaminedConvention>> {
         let trials = self.expression_trials(dark)?;
         Ok(trials
@@ -238,9 +238,9 @@ impl Enhancer {
             .collect())
     }
 
-    /// The images of the outputs that are not read.
+    /// Images of the outputs that are not read.
     fn other_outputs(&self, frames: &[Rgb], ranges: RangePair) -> Result<Vec<ExaminedConvention>> {
-        let seen: Vec<Codes> = frames.iter().map(Codes::from_rgb).collect();
+        let seen: Vec<UnclampedImage> = frames.iter().map(UnclampedImage::from_rgb).collect();
         let mut columns = Vec::new();
         for Port { name, .. } in &self.graph().signature.unread {
             let convention = ModelSidecar {
@@ -248,12 +248,14 @@ impl Enhancer {
                 image: None,
                 ..self.convention().clone()
             };
-            let convention = convention.fed(ranges.input).read(ranges.output);
-            // An output that is no image, such as curves, is left out.
+            let convention = convention
+                .with_input_scale(ranges.input)
+                .with_output_scale(ranges.output);
+            // Outputs that cannot be an image, such as curves, are left out.
             let Ok(graph) = self.graph().with_convention(convention) else {
                 continue;
             };
-            let made = made(&[graph], frames)?;
+            let made = run_frames(&[graph], frames)?;
             if let Some(made) = made.and_then(|mut made| made.pop()) {
                 let pair = PairTrial::new(ranges, &seen, made);
                 columns.push(column(&pair, format!("output {name:?}, {ranges}")));
@@ -270,8 +272,8 @@ fn swapped(order: ChannelOrder) -> ChannelOrder {
     }
 }
 
-/// The conventions to draw: the plausible ones, and the partly stated one that a run would use. If none is plausible, all of them. `output`
-/// names the output to read if the image is not known.
+/// Conventions to draw: the plausible ones and the one that a run would use (`stated`), or all if none is plausible. `output` is a prefix
+/// of the titles that names the output.
 fn conventions_to_draw(
     output: &str,
     probe: &Probe,
@@ -288,11 +290,12 @@ fn conventions_to_draw(
     let swapped = columns(swapped, |ranges| {
         format!("{output}{ranges}, {order} in the output")
     });
-    // Nine more pictures of what cannot be would only distract.
-    let plausible = swapped
-        .into_iter()
-        .filter(|column| column.problem.is_none());
-    shown.extend(plausible);
+    // Implausible images in the other channel order would only distract.
+    shown.extend(
+        swapped
+            .into_iter()
+            .filter(|column| column.problem.is_none()),
+    );
     shown.extend(others);
     if shown.iter().any(|column| column.problem.is_none()) {
         shown.retain(|column| {
@@ -311,18 +314,18 @@ fn columns(probe: &Probe, title: impl Fn(RangePair) -> String) -> Vec<ExaminedCo
 }
 
 fn column(pair: &PairTrial, title: String) -> ExaminedConvention {
-    let images = pair
-        .made
-        .iter()
-        .zip(&pair.verdicts)
-        .map(|(made, verdict)| ExaminedImage {
-            image: made.to_rgb(),
-            facts: made.facts(),
-            problem: verdict.map(|verdict| verdict.to_string()),
-        });
     ExaminedConvention {
         title,
-        images: images.collect(),
-        problem: pair.verdict().map(|seen| seen.to_string()),
+        images: pair
+            .made
+            .iter()
+            .zip(&pair.verdicts)
+            .map(|(output, verdict)| ExaminedImage {
+                image: output.to_rgb(),
+                facts: output.facts(),
+                problem: verdict.map(|verdict| verdict.to_string()),
+            })
+            .collect(),
+        problem: pair.verdict().map(|verdict| verdict.to_string()),
     }
 }

@@ -1,17 +1,17 @@
-//! Output of a model for black and for white: [`Endpoints`].
+//! Mean output of a model for black and for white input: [`Endpoints`].
 
 use std::ops::Range;
 
-use super::plausible::Codes;
+use super::plausible::UnclampedImage;
 use darkqa_ground::types::Rgb;
 
-/// Height and width of the image of black and white, in pixels, where the model takes any: that of the first frames of the probe.
+/// Height and width, in pixels, of the black and white test image if the model accepts any size; equal to the first size of the probe.
 pub(super) const SIZE: [usize; 2] = [96, 144];
 
 /// Mean output of a model for black and for white, in codes of 0..255.
 ///
-/// In its true value ranges, a model that lights up images keeps black nearly black and white nearly white. Measured on 9 trained
-/// models: at most 20 codes off in sum (RUAS); in wrong ranges that still give plausible images, mostly 100 and more.
+/// With the right value ranges, a low-light enhancer keeps black nearly black and white nearly white. Measured on 9 trained models: the
+/// distances add up to at most 20 codes (RUAS); with wrong ranges that still give plausible images, mostly to 100 and more.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Endpoints {
     pub(super) black: f64,
@@ -20,17 +20,17 @@ pub(super) struct Endpoints {
     pub(super) distance: f64,
 }
 
-/// Largest distance of black and white from themselves, in codes, at which they count as near. Chosen.
-const NEAR: f64 = 50.0;
+/// Maximum [`Endpoints::distance`], in codes, at which black and white count as preserved. Chosen.
+const MAX_DISTANCE: f64 = 50.0;
 
 impl Endpoints {
-    /// Whether black and white stay near to themselves.
+    /// True if black stays nearly black and white nearly white.
     pub(super) fn are_near(self) -> bool {
-        self.distance <= NEAR
+        self.distance <= MAX_DISTANCE
     }
 
-    /// The means of an output for [`black_and_white`], away from the edge between the halves and from the border.
-    pub(super) fn from_codes(codes: &Codes) -> Self {
+    /// Means of the output for [`black_and_white`], in the middle of each half.
+    pub(super) fn from_codes(codes: &UnclampedImage) -> Self {
         let half = codes.width / 2;
         let quarter = half / 4;
         let black = channel_means(codes, quarter..half - quarter);
@@ -44,8 +44,8 @@ impl Endpoints {
 }
 
 /// Means of red, green and blue in these columns of the middle half of the rows, in codes.
-fn channel_means(codes: &Codes, columns: Range<usize>) -> [f64; 3] {
-    let Codes { height, width, .. } = *codes;
+fn channel_means(codes: &UnclampedImage, columns: Range<usize>) -> [f64; 3] {
+    let UnclampedImage { height, width, .. } = *codes;
     let rows = height / 4..(height - height / 4).max(1);
     let pixels = rows.len() * columns.len();
     let mut sums = [0.0; 3];
@@ -64,8 +64,8 @@ fn mean(channels: [f64; 3]) -> f64 {
     channels.iter().sum::<f64>() / 3.0
 }
 
-/// An image whose left half is black and whose right half is white, so that models that stretch an image to its darkest and brightest
-/// pixel do so.
+/// An image with a black left half and a white right half. Both are in one image, because some models stretch an image to its darkest and
+/// brightest pixels.
 pub(super) fn black_and_white([height, width]: [usize; 2]) -> Rgb {
     let mut image = Rgb::black(height, width);
     for row in image.samples_mut().chunks_exact_mut(3 * width) {
@@ -80,7 +80,7 @@ mod tests {
 
     #[test]
     fn black_and_white_have_their_own_codes() {
-        let codes = Codes::from_rgb(&black_and_white([96, 144]));
+        let codes = UnclampedImage::from_rgb(&black_and_white([96, 144]));
         let expected = Endpoints {
             black: 0.0,
             white: 255.0,
@@ -92,7 +92,7 @@ mod tests {
     #[test]
     fn smallest_images_have_finite_endpoints() {
         for size in [[1, 1], [1, 2], [2, 1]] {
-            let codes = Codes::from_rgb(&black_and_white(size));
+            let codes = UnclampedImage::from_rgb(&black_and_white(size));
             assert!(
                 Endpoints::from_codes(&codes).distance.is_finite(),
                 "{size:?}"

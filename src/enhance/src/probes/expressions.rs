@@ -1,4 +1,4 @@
-//! Images that authors make of an output that is not the image itself: residuals, gains and light maps.
+//! Trials of expressions for outputs that are not the image itself: residuals, gains and light maps.
 
 use super::endpoints::Endpoints;
 use super::probe::{PairTrial, Probe};
@@ -7,25 +7,25 @@ use super::range_pair::RangePair;
 use crate::conventions::sidecar::ADD;
 use crate::conventions::{Channels, ValueRange};
 use crate::enhancer::Enhancer;
-use crate::outputs::{in_expression, light_map_line};
+use crate::outputs::{expression_name, light_map_line};
 use darkqa_ground::error::Result;
 use darkqa_ground::types::{Flaw, Rgb};
 
-/// Maximum mean output for white, in codes, at which the output may be a residual, and minimum difference between those for white and black
-/// at which it is an image. Chosen: models that return the image itself exceed 230.
+/// Threshold in codes, chosen. An output up to it for white may be a residual, and one whose difference between white and black is up to
+/// it may be a map. Models that return the image itself exceed 230.
 const MIN_CONTRAST: f64 = 64.0;
 
-/// Expressions of the input and of an output that is not the image, with the kind of the output. `OUTPUT` stands for its name.
+/// Expressions that may give the image, with the kind of output that they suit. `OUTPUT` is the placeholder of the output's name.
 const EXPRESSIONS: [(&str, &str); 5] = [
     ("input + OUTPUT", "a residual"),
     ("input - OUTPUT", "a residual"),
     ("input * OUTPUT", "a gain"),
-    // Without a clip, so that an output of small noise gives values out of range.
+    // Not clipped, so that an output of faint noise gives values out of range and is rejected.
     ("input / max(OUTPUT, 0.001)", "a light map"),
     ("1 - OUTPUT", "the negative"),
 ];
 
-/// Parts of the names of outputs that are not the image but are applied to the input.
+/// Parts of the names of outputs that are not the image but are combined with the input.
 const NAMES: [&str; 8] = [
     "illu",
     "light_map",
@@ -40,14 +40,14 @@ const NAMES: [&str; 8] = [
 /// Kind of an output that is not the image itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum OutputKind {
-    /// Nearly black for white: added to the input.
+    /// Nearly black for a white image: to be added to the input.
     Residual,
-    /// As bright for black as for white: the input is divided by it or multiplied with it.
+    /// As bright for black as for white: to be multiplied with the input, or a divisor of it.
     Map,
 }
 
 impl OutputKind {
-    /// The kind that the output for black and white shows; `None` if it may be the image.
+    /// Kind of an output with these values for black and white; `None` if it may be the image.
     fn from_endpoints(endpoints: Endpoints) -> Option<Self> {
         let Endpoints { black, white, .. } = endpoints;
         if white <= MIN_CONTRAST {
@@ -60,17 +60,17 @@ impl OutputKind {
     }
 }
 
-/// An expression of the input and the output, with the model's images by it.
+/// Trial of an expression of input and output.
 pub(super) struct ExpressionTrial {
-    /// The expression, as `input + output`.
+    /// The expression, such as `input + output`.
     pub(super) text: String,
-    /// Kind of the output, as `a residual`.
+    /// Kind of the output, such as `a residual`.
     pub(super) kind: &'static str,
     pub(super) pair: PairTrial,
 }
 
 impl Enhancer {
-    /// The trials of [`EXPRESSIONS`], in 0..1 where no range is stated; none if the image is an expression already, or if the model fails.
+    /// Trials of [`EXPRESSIONS`], in 0..1 where no range is stated; empty if the image is an expression already, or if the model fails.
     ///
     /// # Errors
     /// If the runtime fails.
@@ -81,14 +81,14 @@ impl Enhancer {
         let ranges = self
             .stated_ranges()
             .map(|range| range.or(Some(ValueRange::Unit)));
-        let name = in_expression(&self.graph().signature.outputs[0].port.name);
+        let name = expression_name(&self.graph().signature.outputs[0].port.name);
         let texts = EXPRESSIONS.map(|(text, _)| text.replace("OUTPUT", &name));
         let mut conventions = texts.clone().map(|_| self.convention().clone());
         for (convention, text) in conventions.iter_mut().zip(&texts) {
             convention.output = None;
             let image = text
                 .parse()
-                .map_err(|problem: String| self.fault(problem))?;
+                .map_err(|problem: String| self.error(problem))?;
             convention.image = Some(image);
         }
         let conventions = conventions.each_ref();
@@ -114,8 +114,7 @@ impl Enhancer {
         Ok(trials)
     }
 
-    /// The expressions by which an output that is not the image gives plausible images, in a sentence with the lines of a sidecar; `None`
-    /// if there are none.
+    /// Sentence with the sidecar lines of the expressions that give plausible images; `None` if no expression does.
     ///
     /// # Errors
     /// If the runtime fails.
@@ -140,7 +139,7 @@ impl Enhancer {
         }))
     }
 
-    /// The kind of an output that does not keep black and white apart in these ranges, as an image does; `None` if it does.
+    /// Kind of the output, judged by its values for black and white in these ranges; `None` if it may be the image.
     ///
     /// # Errors
     /// If the runtime fails.
@@ -152,7 +151,7 @@ impl Enhancer {
         Ok(endpoints.and_then(OutputKind::from_endpoints))
     }
 
-    /// The remark on an output that black and white show to be no image; `None` if they do not.
+    /// Caveat about an output that is not an image, judged by its values for black and white; `None` if it may be one.
     ///
     /// # Errors
     /// If the runtime fails.
@@ -160,7 +159,7 @@ impl Enhancer {
         let Some(kind) = self.kind_by_endpoints(ranges)? else {
             return Ok(None);
         };
-        let name = in_expression(&self.graph().signature.outputs[0].port.name);
+        let name = expression_name(&self.graph().signature.outputs[0].port.name);
         Ok(Some(match kind {
             OutputKind::Residual => format!(
                 "its output is nearly black for a white image, like a residual; if the model's code adds it, {ADD}: `image = \"input + {name}\"`; `darkqa-eval enhance doctor` shows both"
@@ -172,7 +171,7 @@ impl Enhancer {
         }))
     }
 
-    /// The remark on an output that is read as the image and named like a map or a residual; `None` if it is not.
+    /// Caveat about an output that is read as the image but named like a map or a residual; `None` for other names.
     pub(super) fn remark_on_name(&self) -> Option<String> {
         if !self.reads_plain_image() || self.convention().output.is_some() {
             return None;
@@ -180,14 +179,14 @@ impl Enhancer {
         let name = &self.graph().signature.outputs[0].port.name;
         let lower_case = name.to_lowercase();
         NAMES.iter().find(|word| lower_case.contains(**word))?;
-        let term = in_expression(name);
+        let term = expression_name(name);
         Some(format!(
             "its output {name:?} is named like a map or a residual, but read as the image; {ADD} what the model's code does: `{}`, `image = \"input + {term}\"` or `output = {name:?}`",
             light_map_line(&term)
         ))
     }
 
-    /// Whether all channels of one output are read as the image, without an expression.
+    /// True if all channels of one output are read as the image, without an expression.
     fn reads_plain_image(&self) -> bool {
         let convention = self.convention();
         convention.image.is_none()

@@ -1,4 +1,4 @@
-//! Probes of a model on dark frames, and judgement of its images.
+//! Probes of a model on dark frames, and plausibility of its images.
 
 mod doctor;
 mod endpoints;
@@ -13,7 +13,7 @@ mod usage;
 
 pub use doctor::{Examination, ImageOutput, ProposedLine, Settled};
 pub use findings::Findings;
-pub(super) use plausible::Codes;
+pub(super) use plausible::UnclampedImage;
 pub use plausible::{DARK, brightness};
 pub use probe::FRAMES;
 pub(super) use range_pair::RangePair;

@@ -1,8 +1,8 @@
-//! Plausibility of an enhanced image, given the dark one: [`judge`].
+//! Plausibility of an enhanced image, compared with the dark one: [`judge`].
 //!
-//! The rules find outputs that are decoded in the wrong way: another range, the wrong output, swapped colours or dimensions. They do not
-//! judge the quality of an enhancement. Their thresholds were set on 9 trained models and 25 dark images each, so that none of these models
-//! is flagged; `src/docs/enhance.md` lists the faults that they find and miss.
+//! The rules detect outputs that are decoded in a wrong way: another range, the wrong output, swapped colours or dimensions. They do not
+//! judge the quality of an enhancement. Their thresholds were set on 9 trained models with 25 dark images each, so that none of these
+//! models is flagged; `src/docs/enhance.md` lists the faults that they find and miss.
 
 use std::fmt;
 
@@ -12,38 +12,38 @@ use crate::conventions::LUMA;
 use crate::planes::Planes;
 use darkqa_ground::types::{Flaw, Rgb};
 
-/// Largest mean luma, in codes, of an image that is judged: on bright images the rules flag good models. Measured.
+/// Maximum mean luma, in codes, of a degraded image whose enhancement is judged; measured. On brighter images the rules flag good models.
 pub const DARK: f64 = 64.0;
-/// Longer side of the images that are judged, in pixels: that of the images from which the thresholds come.
+/// Maximum longer side, in pixels, of the images that are judged: that of the images on which the thresholds were set.
 const JUDGED_SIDE: usize = 160;
 /// Share of the pixels that count as the darkest.
 const DARKEST_SHARE: f64 = 0.01;
-/// How much nearer to the mean the darkest pixels must be than in the dark frame, as a ratio, for a haze. Codes of light that is dimmed
-/// keep their ratios, as their curve is nearly a power. Chosen: noise moves the ratio less.
-const LIFTED: f64 = 1.5;
-/// Mean difference of the channels of blocks, in codes, above which a dark frame has colours, and below which an output has none. Chosen:
-/// noise of single pixels does not reach the first, and only three equal channels stay below the second.
-const COLOURED: f64 = 1.0;
-const GREY: f64 = 0.1;
-/// Side of the blocks whose means are compared, in pixels; chosen, so that noise is averaged out.
+/// Factor by which the ratio of the darkest pixels to the mean must exceed that of the dark frame for a haze; chosen. Dimming hardly
+/// changes the ratio, because the curve of the codes is nearly a power, and noise changes it less than this factor.
+const HAZE_RATIO: f64 = 1.5;
+/// Mean difference between the channels of blocks, in codes, above which a dark frame is coloured; chosen above the effect of noise.
+const MIN_COLOUR: f64 = 1.0;
+/// Mean difference between the channels of blocks, in codes, below which an output is grey; chosen so that only equal channels pass.
+const MAX_GREY: f64 = 0.1;
+/// Side of the blocks whose means are compared, in pixels; chosen, to average out noise.
 const BLOCK: usize = 4;
 
-/// Whether a flaw rules out an enhanced image, or only makes it doubtful.
+/// Severity of a flaw.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Gravity {
-    /// It can be no enhanced image.
+    /// The output cannot be an enhanced image.
     Impossible,
-    /// Some models do that, if the user states how they are fed and read.
+    /// Some models have this flaw even with the right convention.
     Doubtful,
 }
 
-/// Flaw of one output, with the figure that shows it.
+/// Flaw of one output, with the measured figure.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(super) struct Verdict {
     pub(super) flaw: Flaw,
     pub(super) gravity: Gravity,
-    /// The figure that the flaw's rule compares.
+    /// Figure that the rule compares with its threshold.
     pub(super) figure: f64,
 }
 
@@ -68,18 +68,18 @@ impl fmt::Display for Verdict {
     }
 }
 
-/// An output of a model: red, green and blue of each pixel in codes of 0..255, neither clamped nor rounded.
+/// Decoded output of a model before clamping and rounding: packed RGB samples in codes of 0..255.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Codes {
+pub(crate) struct UnclampedImage {
     pub(super) height: usize,
     pub(super) width: usize,
     /// The samples, height × width × 3.
     pub(super) samples: Vec<f32>,
 }
 
-impl Codes {
-    /// Codes of this height and width that are no numbers: those of an output whose values cannot be an image.
-    pub(crate) fn unusable([height, width]: [usize; 2]) -> Self {
+impl UnclampedImage {
+    /// An image of NaN, for an output whose values cannot be decoded.
+    pub(crate) fn not_a_number([height, width]: [usize; 2]) -> Self {
         Self {
             height,
             width,
@@ -87,7 +87,7 @@ impl Codes {
         }
     }
 
-    /// The codes of an image of bytes.
+    /// The codes of an 8-bit image.
     pub(super) fn from_rgb(image: &Rgb) -> Self {
         Self {
             height: image.height(),
@@ -100,9 +100,9 @@ impl Codes {
         }
     }
 
-    /// The codes of an image, reduced by a whole factor to at most [`JUDGED_SIDE`] pixels: each sample is the mean of a square. The
-    /// rest at the right and below is left out.
-    pub(super) fn small(image: &Rgb) -> Self {
+    /// The codes of an 8-bit image, downscaled by an integer factor to a longer side of at most [`JUDGED_SIDE`] pixels. Each sample is the
+    /// mean of a square; incomplete squares at the right and bottom are left out.
+    pub(super) fn downscaled(image: &Rgb) -> Self {
         let longer = image.height().max(image.width());
         let factor = longer.div_ceil(JUDGED_SIDE);
         let [height, width] = [image.height(), image.width()].map(|side| side / factor);
@@ -137,20 +137,21 @@ impl Codes {
         }
     }
 
-    /// The codes of an image of floats.
+    /// The codes of a planar RGB image.
     pub(crate) fn from_planes(planes: &Planes) -> Self {
         let pixels = planes.height * planes.width;
-        let samples = (0..pixels).flat_map(|pixel| {
-            [0, 1, 2].map(|channel| 255.0 * planes.samples[channel * pixels + pixel])
-        });
         Self {
             height: planes.height,
             width: planes.width,
-            samples: samples.collect(),
+            samples: (0..pixels)
+                .flat_map(|pixel| {
+                    [0, 1, 2].map(|channel| 255.0 * planes.samples[channel * pixels + pixel])
+                })
+                .collect(),
         }
     }
 
-    /// The codes as an image, clamped and rounded; values that are not numbers are black.
+    /// The image clamped and rounded to 8 bits; NaN becomes black.
     pub(super) fn to_rgb(&self) -> Rgb {
         let mut image = Rgb::black(self.height, self.width);
         image
@@ -161,7 +162,7 @@ impl Codes {
         image
     }
 
-    /// Figures of the brightness and of what clamping cuts off.
+    /// Statistics of the brightness and of the clamped samples.
     pub(super) fn facts(&self) -> Facts {
         let luma = self.luma().samples;
         let clipped = self
@@ -205,7 +206,7 @@ impl Codes {
         })
     }
 
-    /// Red less blue of each block, relative to its light; 3 codes keep black blocks from counting.
+    /// Difference between red and blue of each block, relative to its brightness. The 3 codes added to the divisor suppress black blocks.
     fn warmth(&self) -> Vec<f64> {
         let [red, green, blue] = self.channel_blocks();
         red.iter()
@@ -215,7 +216,7 @@ impl Codes {
             .collect()
     }
 
-    /// Mean difference between the largest and the smallest channel of the blocks, in codes.
+    /// Mean difference between the largest and the smallest channel of blocks, in codes.
     fn colour(&self) -> f64 {
         let [red, green, blue] = self.channel_blocks();
         let differences: Vec<f64> = red
@@ -228,15 +229,16 @@ impl Codes {
     }
 }
 
-/// Figures of an image, in codes of 0..255.
+/// Statistics of an image, in codes of 0..255.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Facts {
     /// Mean luma.
     pub brightness: f64,
-    /// The 1st and the 99th percentile of luma.
+    /// 1st percentile of luma.
     pub darkest: f64,
+    /// 99th percentile of luma.
     pub brightest: f64,
-    /// Share of the samples that were beyond 0..255.
+    /// Share of the samples outside 0..255.
     pub clipped: f64,
 }
 
@@ -256,23 +258,17 @@ pub fn brightness(image: &Rgb) -> f64 {
         / pixels
 }
 
-/// First flaw that is found in an output for a dark image of the same size; `None` if the output is plausible.
-pub(super) fn judge(dark: &Codes, made: &Codes) -> Option<Verdict> {
-    let count = made.samples.len() as f64;
-    let share = |is: &dyn Fn(&f32) -> bool| {
-        made.samples.iter().filter(|value| is(value)).count() as f64 / count
-    };
-    let impossible = |flaw, figure| Some(verdict(flaw, Gravity::Impossible, figure));
-    let doubtful = |flaw, figure| Some(verdict(flaw, Gravity::Doubtful, figure));
-    let unfinished = share(&|value| !value.is_finite());
-    if unfinished > 0.0 {
-        return impossible(Flaw::Nan, unfinished);
+/// First flaw found in an output for a dark image of the same size; `None` if the output is plausible.
+pub(super) fn judge(dark: &UnclampedImage, output: &UnclampedImage) -> Option<Verdict> {
+    let not_finite = share(&output.samples, |value| !value.is_finite());
+    if not_finite > 0.0 {
+        return impossible(Flaw::Nan, not_finite);
     }
-    let outside = share(&|value| !(-25.5..=280.5).contains(value));
+    let outside = share(&output.samples, |value| !(-25.5..=280.5).contains(&value));
     if outside > 0.2 {
         return impossible(Flaw::Range, outside);
     }
-    let (before, after) = (dark.luma(), made.luma());
+    let (before, after) = (dark.luma(), output.luma());
     let deviation = after.deviation();
     if deviation < 1.5 {
         return impossible(Flaw::Flat, deviation);
@@ -294,35 +290,63 @@ pub(super) fn judge(dark: &Codes, made: &Codes) -> Option<Verdict> {
     if let Some(found) = structure(&before.blocks(), &after.blocks()) {
         return Some(found);
     }
-    let (was, is) = (dark.warmth(), made.warmth());
-    let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-    let strength = product(&was, &was);
-    let cosine = product(&was, &is) / (strength * product(&is, &is)).sqrt();
+    let (was, is) = (dark.warmth(), output.warmth());
+    let strength = dot_product(&was, &was);
+    let cosine = dot_product(&was, &is) / (strength * dot_product(&is, &is)).sqrt();
     if (strength / was.len() as f64).sqrt() > 0.06 && cosine < -0.25 {
         return impossible(Flaw::Hue, cosine);
     }
-    let [was, is] = [dark, made].map(Codes::colour);
-    if was > COLOURED && is < GREY {
+    let [was, is] = [dark, output].map(UnclampedImage::colour);
+    if was > MIN_COLOUR && is < MAX_GREY {
         return doubtful(Flaw::Grey, is);
     }
     let darkest = percentile(&after.samples, DARKEST_SHARE);
-    // A pale room has no dark pixel either: in its dark frame, too, the darkest pixels are near to the mean.
+    // A pale room has no dark pixels either, but the darkest pixels are near the mean in its dark frame, too.
     let [was, is] = [&before.samples, &after.samples]
         .map(|plane| percentile(plane, DARKEST_SHARE) / mean(plane).max(f64::MIN_POSITIVE));
-    (darkest > 100.0 && is > LIFTED * was).then(|| verdict(Flaw::Haze, Gravity::Doubtful, darkest))
-}
-
-fn verdict(flaw: Flaw, gravity: Gravity, figure: f64) -> Verdict {
-    Verdict {
-        flaw,
-        gravity,
-        figure,
+    if darkest > 100.0 && is > HAZE_RATIO * was {
+        return doubtful(Flaw::Haze, darkest);
     }
+    None
 }
 
-/// Whether the blocks of an output follow those of its input.
+/// The verdict on an impossible output, always `Some`.
+#[expect(
+    clippy::unnecessary_wraps,
+    reason = "returned by rules that may find nothing"
+)]
+fn impossible(flaw: Flaw, figure: f64) -> Option<Verdict> {
+    Some(Verdict {
+        flaw,
+        gravity: Gravity::Impossible,
+        figure,
+    })
+}
+
+/// The verdict on a doubtful output, always `Some`.
+#[expect(
+    clippy::unnecessary_wraps,
+    reason = "returned by rules that may find nothing"
+)]
+fn doubtful(flaw: Flaw, figure: f64) -> Option<Verdict> {
+    Some(Verdict {
+        flaw,
+        gravity: Gravity::Doubtful,
+        figure,
+    })
+}
+
+/// Share of the values that satisfy a condition.
+fn share(values: &[f32], condition: impl Fn(f32) -> bool) -> f64 {
+    values.iter().filter(|value| condition(**value)).count() as f64 / values.len() as f64
+}
+
+fn dot_product(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// Flaw of an output whose blocks do not follow those of its input in brightness.
 fn structure(before: &Plane, after: &Plane) -> Option<Verdict> {
-    let impossible = |flaw, figure| Some(verdict(flaw, Gravity::Impossible, figure));
     let order = correlation(&ranks(&before.samples), &ranks(&after.samples));
     if order < -0.3 {
         return impossible(Flaw::Inverted, order);
@@ -333,7 +357,6 @@ fn structure(before: &Plane, after: &Plane) -> Option<Verdict> {
     let (was, is) = (before.steps(), after.steps());
     let sizes: Vec<f64> = was.iter().map(|step| step.abs()).collect();
     let strong = percentile(&sizes, 0.75);
-    let sign = |step: f64| if step == 0.0 { 0.0 } else { step.signum() };
     let agreement: Vec<f64> = was
         .iter()
         .zip(&is)
@@ -347,6 +370,11 @@ fn structure(before: &Plane, after: &Plane) -> Option<Verdict> {
     None
 }
 
+/// Sign of a number; 0 for 0.
+fn sign(number: f64) -> f64 {
+    if number == 0.0 { 0.0 } else { number.signum() }
+}
+
 /// One channel of an image.
 struct Plane {
     width: usize,
@@ -354,8 +382,7 @@ struct Plane {
 }
 
 impl Plane {
-    /// Means of blocks of [`BLOCK`] × [`BLOCK`] pixels; the rest at the right and below is left out. An image smaller than a
-    /// block stays as it is.
+    /// Means of blocks of [`BLOCK`] × [`BLOCK`] pixels, without incomplete blocks. An image smaller than a block is returned unchanged.
     fn blocks(&self) -> Self {
         let height = self.samples.len() / self.width;
         let [rows, columns] = [height, self.width].map(|side| side / BLOCK);
@@ -380,7 +407,7 @@ impl Plane {
         }
     }
 
-    /// Differences between neighbours, downwards and then to the right.
+    /// Differences between vertical neighbours, then those between horizontal neighbours.
     fn steps(&self) -> Vec<f64> {
         let below = self.samples.get(self.width..).unwrap_or_default();
         let down = self.samples.iter().zip(below).map(|(a, b)| b - a);
@@ -403,7 +430,7 @@ fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
-/// Ranks of values; equal values keep their order, as in the images from which the thresholds come.
+/// Ranks of values; ties are ranked in order of appearance, as when the thresholds were set.
 fn ranks(values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
@@ -414,24 +441,24 @@ fn ranks(values: &[f64]) -> Vec<f64> {
     ranks
 }
 
-/// Pearson's correlation; 0 if one side does not vary.
+/// Pearson's correlation coefficient; 0 if one side does not vary.
 fn correlation(a: &[f64], b: &[f64]) -> f64 {
     let (mean_a, mean_b) = (mean(a), mean(b));
-    let pairs = a.iter().zip(b).map(|(a, b)| (a - mean_a, b - mean_b));
-    let (mut both, mut of_a, mut of_b) = (0.0, 0.0, 0.0);
-    for (a, b) in pairs {
-        both += a * b;
-        of_a += a * a;
-        of_b += b * b;
+    let (mut covariance, mut variance_a, mut variance_b) = (0.0, 0.0, 0.0);
+    for (a, b) in a.iter().zip(b) {
+        let (a, b) = (a - mean_a, b - mean_b);
+        covariance += a * b;
+        variance_a += a * a;
+        variance_b += b * b;
     }
-    if of_a * of_b > 0.0 {
-        both / (of_a * of_b).sqrt()
+    if variance_a * variance_b > 0.0 {
+        covariance / (variance_a * variance_b).sqrt()
     } else {
         0.0
     }
 }
 
-/// The value at a share of the sorted values, between two of them interpolated (numpy's default).
+/// Quantile for a share of the values, linearly interpolated (numpy's default).
 fn percentile(values: &[f64], share: f64) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);

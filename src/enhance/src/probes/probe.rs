@@ -1,36 +1,36 @@
-//! The probe: whether a model's images of a few dark frames are plausible, and in which value ranges ([`Probe`]).
+//! Plausibility of a model's images of a few dark frames, by value ranges: [`Probe`].
 //!
-//! A graph does not state its value ranges. So where they are not stated, each pair of ranges is tried. The verdict on a pair is
-//! that of at least half of the frames.
+//! A graph does not declare its value ranges. So every pair of ranges that sidecar, preset and element types allow is tried. A pair is
+//! implausible if at least half of the frames have a flaw.
 
 use std::fmt;
 
 use super::endpoints::Endpoints;
-use super::plausible::{Codes, Gravity, Verdict, judge};
+use super::plausible::{Gravity, UnclampedImage, Verdict, judge};
 use super::range_pair::RangePair;
 use crate::conventions::sidecar::ADD;
 use crate::outputs::light_map_line;
 use darkqa_ground::types::Flaw;
 
-/// Number of dark frames that a model is tried on: with 6, none of 9 trained models was flagged; with one, 5 % were.
+/// Number of dark frames of a probe. With 6, none of 9 trained models was flagged; with one frame, 5 % were.
 pub const FRAMES: usize = 6;
 
-/// The finding that no range explains a flaw, with the ranges that were tried.
+/// Message that no range explains a flaw, with the ranges that were tried.
 const NONE_FITS: &str =
     "No usual value range fits (0..1, 0..255, -1..1, -0.5..0.5, mean and std of ImageNet or CLIP)";
 
-/// Placeholder for the output that is read, in the remedy for a flaw.
+/// Placeholder in remedies for the name of the output that is read.
 pub(super) const OUTPUT: &str = "OUTPUT";
 
-/// By how many codes black and white must be nearer to themselves with one pair than with the next for it to be advised alone. Chosen.
-const CLEAR: f64 = 25.0;
+/// Difference in [`PairTrial::distance`], in codes, by which the best pair must beat the second to be advised alone. Chosen.
+const CLEAR_MARGIN: f64 = 25.0;
 
 /// A model's images of the dark frames, with one pair of ranges.
 #[derive(Debug, Clone)]
 pub(super) struct PairTrial {
     pub(super) ranges: RangePair,
     /// Output of the model for each frame.
-    pub(super) made: Vec<Codes>,
+    pub(super) made: Vec<UnclampedImage>,
     /// Flaw of each output.
     pub(super) verdicts: Vec<Option<Verdict>>,
     /// Output for black and white; `None` if it was not measured.
@@ -38,7 +38,11 @@ pub(super) struct PairTrial {
 }
 
 impl PairTrial {
-    pub(super) fn new(ranges: RangePair, dark: &[Codes], made: Vec<Codes>) -> Self {
+    pub(super) fn new(
+        ranges: RangePair,
+        dark: &[UnclampedImage],
+        made: Vec<UnclampedImage>,
+    ) -> Self {
         let verdicts = dark.iter().zip(&made).map(|(dark, made)| judge(dark, made));
         Self {
             ranges,
@@ -48,24 +52,24 @@ impl PairTrial {
         }
     }
 
-    /// Whether no frame has a flaw.
+    /// True if no frame has a flaw.
     pub(super) fn is_clean(&self) -> bool {
         self.verdicts.iter().all(Option::is_none)
     }
 
-    /// Distance of black and white from themselves, in codes; infinite if it was not measured.
+    /// Distance of the outputs for black and white from black and white, in codes; infinite if it was not measured.
     pub(super) fn distance(&self) -> f64 {
         self.endpoints
             .map_or(f64::INFINITY, |endpoints| endpoints.distance)
     }
 
-    /// Whether black and white stay near to themselves.
+    /// True if black stays nearly black and white nearly white.
     pub(super) fn is_near(&self) -> bool {
         self.endpoints.is_some_and(Endpoints::are_near)
     }
 
-    /// The ranges, and what black and white become with them, if it was measured.
-    fn words(&self) -> String {
+    /// Description of the ranges, with the outputs for black and white if they were measured.
+    fn description(&self) -> String {
         match self.endpoints {
             None => self.ranges.to_string(),
             Some(Endpoints { black, white, .. }) => format!(
@@ -80,23 +84,28 @@ impl PairTrial {
         }
     }
 
-    /// The verdict on the model: the most frequent flaw, if at least half of the frames have one.
+    /// Verdict on the pair: the most frequent flaw, if at least half of the frames have one.
     pub(super) fn verdict(&self) -> Option<FlawedFrames> {
-        self.seen().filter(|seen| 2 * seen.flawed >= seen.frames)
+        self.most_frequent_flaw()
+            .filter(|seen| 2 * seen.flawed >= seen.frames)
     }
 
-    /// The most frequent flaw, if a frame has one.
-    fn seen(&self) -> Option<FlawedFrames> {
+    /// The most frequent flaw; `None` if no frame has one.
+    fn most_frequent_flaw(&self) -> Option<FlawedFrames> {
         let flawed: Vec<Verdict> = self.verdicts.iter().flatten().copied().collect();
-        let half = |count: usize| 2 * count >= self.verdicts.len().max(1);
-        let count = |flaw: Flaw| flawed.iter().filter(|one| one.flaw == flaw).count();
         // Reversed, because `max_by_key` returns the last of equally frequent flaws and the first is wanted.
-        let example = flawed.iter().rev().max_by_key(|one| count(one.flaw))?;
+        let example = flawed.iter().rev().max_by_key(|verdict| {
+            flawed
+                .iter()
+                .filter(|other| other.flaw == verdict.flaw)
+                .count()
+        })?;
         let impossible = flawed
             .iter()
-            .filter(|one| one.gravity == Gravity::Impossible);
+            .filter(|verdict| verdict.gravity == Gravity::Impossible)
+            .count();
         Some(FlawedFrames {
-            gravity: if half(impossible.count()) {
+            gravity: if 2 * impossible >= self.verdicts.len().max(1) {
                 Gravity::Impossible
             } else {
                 Gravity::Doubtful
@@ -119,7 +128,7 @@ pub(super) struct FlawedFrames {
 }
 
 impl fmt::Display for FlawedFrames {
-    /// The finding as it follows the file's name.
+    /// Writes the verdict, to follow the file's name.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
             example,
@@ -134,22 +143,22 @@ impl fmt::Display for FlawedFrames {
     }
 }
 
-/// Ranges that the user, a preset or the element types state.
+/// Which ranges the sidecar, a preset or the element types state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Ranges {
-    /// Both.
-    Stated,
-    /// Range of either the input or the output.
-    OneStated,
-    /// None.
-    Open,
+pub(super) enum StatedRanges {
+    /// Both ranges.
+    Both,
+    /// The range of either input or output.
+    One,
+    /// Neither range.
+    Neither,
 }
 
-/// All that was tried.
+/// Trials of a model with all pairs of ranges.
 #[derive(Debug, Clone)]
 pub(super) struct Probe {
-    pub(super) ranges: Ranges,
-    /// The ranges that are used if the probe does not decide.
+    pub(super) ranges: StatedRanges,
+    /// Ranges that are used unless the probe finds a flaw with them.
     pub(super) usual: RangePair,
     pub(super) pairs: Vec<PairTrial>,
 }
@@ -159,20 +168,20 @@ pub(super) struct Probe {
 pub(super) enum Conclusion {
     /// The ranges are stated, and the images are plausible.
     Plausible,
-    /// The images are plausible with the usual ranges, which nothing states.
+    /// The images are plausible with the usual ranges, which are assumed.
     Assumed,
-    /// The ranges are stated, and the images are odd, but some models do that.
+    /// The ranges are stated, and the images have a flaw that some models have.
     Doubtful(FlawedFrames),
-    /// The ranges are stated or all were tried, and the images are implausible.
+    /// The images are implausible with the stated ranges, or with all ranges.
     Implausible(FlawedFrames),
-    /// Only these ranges give plausible images, or they keep black and white nearest to themselves, and they are not the usual ones.
+    /// The images are implausible with the usual ranges, and plausible only or most clearly with this pair.
     Other(RangePair, FlawedFrames),
-    /// Several pairs of ranges give plausible images, the likely ones first, but not the usual ones.
+    /// The images are implausible with the usual ranges, and plausible with these pairs, the likely ones first.
     Several(Vec<RangePair>, FlawedFrames),
 }
 
 impl Probe {
-    /// The pairs whose images are plausible.
+    /// Pairs with which the images are plausible.
     pub(super) fn plausible(&self) -> Vec<RangePair> {
         self.pairs
             .iter()
@@ -181,25 +190,25 @@ impl Probe {
             .collect()
     }
 
-    /// Draws the conclusion.
+    /// Conclusion from all trials.
     pub(super) fn conclusion(&self) -> Conclusion {
         let usual = self.usual_pair();
         let advised = self.advised();
         let seen = usual.and_then(|usual| {
-            // With a flaw on some frames, other than dim images, it gives way to a pair without any.
-            let mixed = usual.seen().filter(|seen| {
-                let is_open = self.ranges != Ranges::Stated && !advised.is_empty();
+            // A flaw on a few frames, other than dim images, counts if another pair has no flaw at all.
+            let mixed = usual.most_frequent_flaw().filter(|seen| {
+                let is_open = self.ranges != StatedRanges::Both && !advised.is_empty();
                 is_open && seen.example.flaw != Flaw::Unlit
             });
             usual.verdict().or(mixed)
         });
         match (self.ranges, seen) {
-            (Ranges::Stated, None) => Conclusion::Plausible,
+            (StatedRanges::Both, None) => Conclusion::Plausible,
             (_, None) => Conclusion::Assumed,
-            (Ranges::Stated, Some(seen)) if seen.gravity == Gravity::Doubtful => {
+            (StatedRanges::Both, Some(seen)) if seen.gravity == Gravity::Doubtful => {
                 Conclusion::Doubtful(seen)
             }
-            (Ranges::Stated, Some(seen)) => Conclusion::Implausible(seen),
+            (StatedRanges::Both, Some(seen)) => Conclusion::Implausible(seen),
             (_, Some(seen)) => match (clear_first(&advised), advised.as_slice()) {
                 (Some(first), _) => Conclusion::Other(first.ranges, seen),
                 (None, []) => Conclusion::Implausible(seen),
@@ -210,12 +219,12 @@ impl Probe {
         }
     }
 
-    /// The usual pair; `None` if it was not tried.
+    /// Trial of the usual pair; `None` if it was not tried.
     pub(super) fn usual_pair(&self) -> Option<&PairTrial> {
         self.pairs.iter().find(|pair| pair.ranges == self.usual)
     }
 
-    /// The pairs that may be advised in place of the usual one: those whose images of all frames are plausible.
+    /// Pairs that may be advised instead of the usual one: those without a flaw on any frame.
     fn advised(&self) -> Vec<&PairTrial> {
         self.pairs
             .iter()
@@ -223,7 +232,7 @@ impl Probe {
             .collect()
     }
 
-    /// The plausible pair that black and white point to; `None` if several are as likely.
+    /// The plausible pair that preserves black and white clearly best; `None` without such a pair.
     pub(super) fn likeliest(&self) -> Option<RangePair> {
         let plausible: Vec<&PairTrial> = self
             .pairs
@@ -233,8 +242,7 @@ impl Probe {
         clear_first(&plausible).map(|pair| pair.ranges)
     }
 
-    /// Puts the pairs first with which black and white stay nearest to themselves, and removes those with a mean and a deviation with
-    /// which they do not.
+    /// Sorts the pairs by how well they preserve black and white, and removes normalised pairs that do not preserve them.
     pub(super) fn rank(&mut self) {
         self.pairs
             .retain(|pair| pair.ranges.is_plain() || pair.is_near());
@@ -242,15 +250,15 @@ impl Probe {
             .sort_by(|a, b| a.distance().total_cmp(&b.distance()));
     }
 
-    /// Leaves out pairs that are plausible on most frames, but not on all.
+    /// Removes pairs that are plausible on most frames, but not on all.
     pub(super) fn leave_out_mixed(&mut self) {
         self.pairs
             .retain(|pair| pair.is_clean() || pair.verdict().is_some());
     }
 
-    /// Whether the images in the usual ranges are merely not brighter.
+    /// True if the only flaw in the usual ranges is that images are not brighter, and ranges are not stated.
     fn is_dim(&self, seen: &FlawedFrames) -> bool {
-        self.ranges != Ranges::Stated
+        self.ranges != StatedRanges::Both
             && seen.example.flaw == Flaw::Unlit
             && seen.gravity == Gravity::Doubtful
     }
@@ -260,16 +268,8 @@ impl Probe {
         self.plausible().first().copied().unwrap_or(self.usual)
     }
 
-    /// The finding and the sidecar lines that would repair it, to follow the file's name; `None` if the images are plausible.
+    /// Message about the flaw and the sidecar lines that would repair it, to follow the file's name; `None` if the images are plausible.
     pub(super) fn problem(&self) -> Option<String> {
-        let usual = self.usual.stated();
-        let dim = |seen: &FlawedFrames| {
-            if self.is_dim(seen) {
-                format!("If its images should be this dim, {ADD}: {usual}. ")
-            } else {
-                String::new()
-            }
-        };
         Some(match self.conclusion() {
             Conclusion::Plausible | Conclusion::Assumed => return None,
             Conclusion::Doubtful(seen) => format!("{seen}"),
@@ -278,15 +278,18 @@ impl Probe {
             }
             Conclusion::Other(pair, seen) => format!(
                 "{seen}. {}With {} they are plausible; if the model's code uses these, {ADD}: {}",
-                dim(&seen),
-                self.words(pair),
+                self.advice_for_dim(&seen),
+                self.pair_description(pair),
                 pair.stated()
             ),
             Conclusion::Several(pairs, seen) => {
-                let list: Vec<String> = pairs.iter().map(|pair| self.words(*pair)).collect();
+                let list: Vec<String> = pairs
+                    .iter()
+                    .map(|pair| self.pair_description(*pair))
+                    .collect();
                 format!(
                     "{seen}. {}With other value ranges they are plausible ({}); {ADD} those of the model's code, such as {}",
-                    dim(&seen),
+                    self.advice_for_dim(&seen),
                     list.join("; "),
                     pairs[0].stated()
                 )
@@ -294,22 +297,32 @@ impl Probe {
         })
     }
 
-    /// A pair, and what black and white become with it.
-    fn words(&self, ranges: RangePair) -> String {
+    /// Advice for a model whose images may be dim on purpose; empty for other flaws.
+    fn advice_for_dim(&self, seen: &FlawedFrames) -> String {
+        if self.is_dim(seen) {
+            let usual = self.usual.stated();
+            format!("If its images should be this dim, {ADD}: {usual}. ")
+        } else {
+            String::new()
+        }
+    }
+
+    /// Description of a pair of ranges, see [`PairTrial::description`].
+    fn pair_description(&self, ranges: RangePair) -> String {
         self.pairs
             .iter()
             .find(|pair| pair.ranges == ranges)
-            .map_or_else(|| ranges.to_string(), PairTrial::words)
+            .map_or_else(|| ranges.to_string(), PairTrial::description)
     }
 
     /// Remedy for a flaw that no other range explains.
     fn remedy(&self, seen: &FlawedFrames) -> String {
         match (seen.example.flaw, self.ranges) {
-            (Flaw::Unlit, Ranges::Open | Ranges::OneStated) => format!(
+            (Flaw::Unlit, StatedRanges::Neither | StatedRanges::One) => format!(
                 "If its images should be this dim, {ADD}: {}",
                 self.usual.stated()
             ),
-            (Flaw::White | Flaw::Haze, Ranges::Open | Ranges::OneStated) => {
+            (Flaw::White | Flaw::Haze, StatedRanges::Neither | StatedRanges::One) => {
                 format!(
                     "{NONE_FITS}; {ADD} `range_in`, `mean`, `std` and `range_out` of the model's code"
                 )
@@ -319,20 +332,20 @@ impl Probe {
     }
 }
 
-/// The first of ranked pairs if it is the only one, or if black and white are clearly nearer to themselves with it than with the second.
+/// The first of ranked pairs, if it is the only one or preserves black and white clearly better than the second.
 fn clear_first<'p>(ranked: &[&'p PairTrial]) -> Option<&'p PairTrial> {
     match ranked {
         [] => None,
         [only] => Some(only),
         [first, second, ..] => {
-            let is_clear = first.is_near() && first.distance() + CLEAR <= second.distance();
+            let is_clear = first.is_near() && first.distance() + CLEAR_MARGIN <= second.distance();
             is_clear.then_some(*first)
         }
     }
 }
 
 /// Remedy for a flaw that no other range explains.
-fn remedy(flaw: Flaw, ranges: Ranges) -> String {
+fn remedy(flaw: Flaw, ranges: StatedRanges) -> String {
     match (flaw, ranges) {
         (Flaw::Hue, _) => format!(
             "If its output is BGR, {ADD}: `color_out = \"bgr\"` (or \"rgb\", if \"bgr\" is set); if its input is, `color = \"bgr\"` and `color_out = \"rgb\"`"
@@ -347,17 +360,17 @@ fn remedy(flaw: Flaw, ranges: Ranges) -> String {
         (Flaw::Shuffled, _) => format!(
             "Perhaps another output is the image, or the dimensions have another order; {ADD} `output`, `layout_in` or `layout_out`"
         ),
-        (Flaw::Nan, Ranges::Open) => "Check its weights and its divisions by zero".to_owned(),
+        (Flaw::Nan, StatedRanges::Neither) => "Check its weights and its divisions by zero".to_owned(),
         (Flaw::Nan, _) => {
             "Check `range_in` in MODEL.onnx.toml, because values that are too large can cause this; else its weights and its divisions by zero".to_owned()
         }
-        (_, Ranges::Stated) => {
+        (_, StatedRanges::Both) => {
             "Check `range_in`, `range_out` and `output` in MODEL.onnx.toml, and the preset".to_owned()
         }
-        (_, Ranges::OneStated) => {
+        (_, StatedRanges::One) => {
             "One range is set, by MODEL.onnx.toml or the element type, and no other fits it; without a line in that file all are tried".to_owned()
         }
-        (_, Ranges::Open) => format!(
+        (_, StatedRanges::Neither) => format!(
             "{NONE_FITS}; perhaps it needs another `mean` and `std`, another output is the image, or the export has lost its weights"
         ),
     }
@@ -377,22 +390,18 @@ mod tests {
         output: ValueScale::Range(ValueRange::Bytes),
     };
 
-    fn pair(ranges: RangePair, flaws: &[Option<(Flaw, Gravity)>]) -> PairTrial {
-        let verdict = |(flaw, gravity)| Verdict {
-            flaw,
-            gravity,
-            figure: 0.0,
-        };
+    /// A pair with these verdicts on the frames.
+    fn pair(ranges: RangePair, verdicts: &[Option<Verdict>]) -> PairTrial {
         PairTrial {
             ranges,
             made: Vec::new(),
-            verdicts: flaws.iter().map(|flaw| flaw.map(verdict)).collect(),
+            verdicts: verdicts.to_vec(),
             endpoints: None,
         }
     }
 
-    /// A plausible pair with black and white so far from themselves, in codes.
-    fn far(ranges: RangePair, distance: f64) -> PairTrial {
+    /// A plausible pair with this distance of black and white, in codes.
+    fn pair_at_distance(ranges: RangePair, distance: f64) -> PairTrial {
         let endpoints = Endpoints {
             black: distance,
             white: 255.0,
@@ -404,7 +413,7 @@ mod tests {
         }
     }
 
-    fn probe(ranges: Ranges, pairs: Vec<PairTrial>) -> Probe {
+    fn probe(ranges: StatedRanges, pairs: Vec<PairTrial>) -> Probe {
         Probe {
             ranges,
             usual: UNIT,
@@ -412,15 +421,34 @@ mod tests {
         }
     }
 
-    const FLAT: Option<(Flaw, Gravity)> = Some((Flaw::Flat, Gravity::Impossible));
-    const WHITE: Option<(Flaw, Gravity)> = Some((Flaw::White, Gravity::Doubtful));
-    const UNLIT: Option<(Flaw, Gravity)> = Some((Flaw::Unlit, Gravity::Doubtful));
+    /// Conclusion from these pairs after ranking.
+    fn ranked_conclusion(pairs: Vec<PairTrial>) -> Conclusion {
+        let mut probe = probe(StatedRanges::Neither, pairs);
+        probe.rank();
+        probe.conclusion()
+    }
+
+    const FLAT: Option<Verdict> = Some(Verdict {
+        flaw: Flaw::Flat,
+        gravity: Gravity::Impossible,
+        figure: 0.0,
+    });
+    const WHITE: Option<Verdict> = Some(Verdict {
+        flaw: Flaw::White,
+        gravity: Gravity::Doubtful,
+        figure: 0.0,
+    });
+    const UNLIT: Option<Verdict> = Some(Verdict {
+        flaw: Flaw::Unlit,
+        gravity: Gravity::Doubtful,
+        figure: 0.0,
+    });
 
     #[test]
     fn usual_ranges_are_assumed_if_they_are_plausible() {
         for bytes in [None, FLAT] {
             let usual = probe(
-                Ranges::Open,
+                StatedRanges::Neither,
                 vec![pair(UNIT, &[None; 6]), pair(BYTES, &[bytes; 6])],
             );
             assert_eq!(usual.conclusion(), Conclusion::Assumed);
@@ -431,7 +459,7 @@ mod tests {
     #[test]
     fn another_pair_is_advised_if_the_usual_one_is_implausible() {
         let other = probe(
-            Ranges::Open,
+            StatedRanges::Neither,
             vec![pair(UNIT, &[FLAT; 6]), pair(BYTES, &[None; 6])],
         );
         assert!(matches!(other.conclusion(), Conclusion::Other(BYTES, _)));
@@ -451,13 +479,16 @@ mod tests {
         let mut flaws = [None; 6];
         flaws[2] = WHITE;
         let one_white = vec![pair(UNIT, &flaws), pair(BYTES, &[None; 6])];
-        let other = probe(Ranges::Open, one_white.clone()).conclusion();
+        let other = probe(StatedRanges::Neither, one_white.clone()).conclusion();
         assert!(matches!(other, Conclusion::Other(BYTES, _)), "{other:?}");
-        let alone = probe(Ranges::Open, one_white[..1].to_vec());
+        let alone = probe(StatedRanges::Neither, one_white[..1].to_vec());
         assert_eq!(alone.conclusion(), Conclusion::Assumed);
         flaws[2] = UNLIT;
         let dim = vec![pair(UNIT, &flaws), pair(BYTES, &[None; 6])];
-        assert_eq!(probe(Ranges::Open, dim).conclusion(), Conclusion::Assumed);
+        assert_eq!(
+            probe(StatedRanges::Neither, dim).conclusion(),
+            Conclusion::Assumed
+        );
     }
 
     #[test]
@@ -465,7 +496,7 @@ mod tests {
         let mut flaws = [None; 6];
         flaws[2] = WHITE;
         let dim = probe(
-            Ranges::Open,
+            StatedRanges::Neither,
             vec![pair(UNIT, &[UNLIT; 6]), pair(BYTES, &flaws)],
         );
         let problem = dim.problem().unwrap();
@@ -476,12 +507,13 @@ mod tests {
     #[test]
     fn the_usual_ranges_are_named_first_if_the_images_are_dim() {
         let dim = probe(
-            Ranges::Open,
+            StatedRanges::Neither,
             vec![pair(UNIT, &[UNLIT; 6]), pair(BYTES, &[None; 6])],
         );
         let problem = dim.problem().unwrap();
-        let place = |words: &str| problem.find(words).unwrap();
-        assert!(place("range_in = \"0..1\"") < place("range_in = \"0..255\""));
+        let [usual, other] = ["range_in = \"0..1\"", "range_in = \"0..255\""]
+            .map(|line| problem.find(line).unwrap());
+        assert!(usual < other, "{problem}");
     }
 
     #[test]
@@ -490,24 +522,16 @@ mod tests {
             input: UNIT.input,
             output: ValueScale::Range(ValueRange::Signed),
         };
-        let ranked = |first: f64, second: f64| {
-            let pairs = vec![
+        let [clear, close, far] = [(2.0, 120.0), (2.0, 9.0), (90.0, 200.0)].map(|distances| {
+            ranked_conclusion(vec![
                 pair(UNIT, &[FLAT; 6]),
-                far(signed, second),
-                far(BYTES, first),
-            ];
-            let mut probe = probe(Ranges::Open, pairs);
-            probe.rank();
-            probe.conclusion()
-        };
-        assert!(matches!(ranked(2.0, 120.0), Conclusion::Other(BYTES, _)));
-        let Conclusion::Several(pairs, _) = ranked(2.0, 9.0) else {
-            panic!("nearly as near");
-        };
-        assert_eq!(pairs, [BYTES, signed]);
-        let Conclusion::Several(..) = ranked(90.0, 200.0) else {
-            panic!("none is near");
-        };
+                pair_at_distance(signed, distances.1),
+                pair_at_distance(BYTES, distances.0),
+            ])
+        });
+        assert!(matches!(clear, Conclusion::Other(BYTES, _)));
+        assert!(matches!(close, Conclusion::Several(pairs, _) if pairs == [BYTES, signed]));
+        assert!(matches!(far, Conclusion::Several(..)));
     }
 
     #[test]
@@ -516,22 +540,20 @@ mod tests {
             input: ValueScale::Normalised(Normalisation::Clip),
             output: UNIT.output,
         };
-        let conclusion = |distance: f64| {
-            let mut probe = probe(
-                Ranges::Open,
-                vec![pair(UNIT, &[FLAT; 6]), far(clip, distance)],
-            );
-            probe.rank();
-            probe.conclusion()
-        };
-        assert!(matches!(conclusion(10.0), Conclusion::Other(pair, _) if pair == clip));
-        assert!(matches!(conclusion(60.0), Conclusion::Implausible(_)));
+        let [near, far] = [10.0, 60.0].map(|distance| {
+            ranked_conclusion(vec![
+                pair(UNIT, &[FLAT; 6]),
+                pair_at_distance(clip, distance),
+            ])
+        });
+        assert!(matches!(near, Conclusion::Other(pair, _) if pair == clip));
+        assert!(matches!(far, Conclusion::Implausible(_)));
     }
 
     #[test]
     fn no_plausible_pair_names_the_flaw_of_the_usual_one() {
         let none = probe(
-            Ranges::Open,
+            StatedRanges::Neither,
             vec![pair(UNIT, &[WHITE; 6]), pair(BYTES, &[FLAT; 6])],
         );
         let Conclusion::Implausible(seen) = none.conclusion() else {
@@ -542,20 +564,20 @@ mod tests {
 
     #[test]
     fn half_of_the_frames_decide() {
-        let flawed = |count: usize| {
-            let flaws: Vec<_> = (0..6).map(|i| FLAT.filter(|_| i < count)).collect();
-            probe(Ranges::Stated, vec![pair(UNIT, &flaws)]).conclusion()
-        };
-        assert_eq!(flawed(2), Conclusion::Plausible);
-        assert!(matches!(flawed(3), Conclusion::Implausible(_)));
+        let two = pair(UNIT, &[FLAT, FLAT, None, None, None, None]);
+        let conclusion = probe(StatedRanges::Both, vec![two]).conclusion();
+        assert_eq!(conclusion, Conclusion::Plausible);
+        let three = pair(UNIT, &[FLAT, FLAT, FLAT, None, None, None]);
+        let conclusion = probe(StatedRanges::Both, vec![three]).conclusion();
+        assert!(matches!(conclusion, Conclusion::Implausible(_)));
     }
 
     #[test]
     fn stated_ranges_may_be_doubtful_but_not_impossible() {
-        let doubtful = probe(Ranges::Stated, vec![pair(UNIT, &[WHITE; 6])]);
+        let doubtful = probe(StatedRanges::Both, vec![pair(UNIT, &[WHITE; 6])]);
         assert!(matches!(doubtful.conclusion(), Conclusion::Doubtful(_)));
         let mixed = probe(
-            Ranges::Stated,
+            StatedRanges::Both,
             vec![pair(UNIT, &[WHITE, WHITE, WHITE, FLAT, FLAT, FLAT])],
         );
         assert!(matches!(mixed.conclusion(), Conclusion::Implausible(_)));

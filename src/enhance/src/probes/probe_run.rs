@@ -1,43 +1,42 @@
 //! Running the probe of a model on dark frames: [`Enhancer::probe`].
 
 use super::endpoints::{self, Endpoints, black_and_white};
-use super::findings::warn_of_untried;
-use super::plausible::Codes;
-use super::probe::{Conclusion, OUTPUT, PairTrial, Probe, Ranges};
+use super::findings::warn_not_probed;
+use super::plausible::UnclampedImage;
+use super::probe::{Conclusion, OUTPUT, PairTrial, Probe, StatedRanges};
 use super::range_pair::RangePair;
-use super::trial_images::made;
-use super::usage::{ImageUse, Implausible, Seen, way_out};
+use super::trial_images::run_frames;
+use super::usage::{ImageUse, Implausible, Judgement, doctor_advice};
 use crate::conventions::sidecar::{self, ADD, ModelSidecar};
 use crate::conventions::{Rounding, ValueRange};
 use crate::enhancer::Enhancer;
 use crate::graphs::Graph;
-use crate::outputs::in_expression;
+use crate::outputs::expression_name;
 use crate::planes::Planes;
 use darkqa_ground::error::Result;
 use darkqa_ground::types::manifests::{ProbeNote, ProbeOutcome};
 use darkqa_ground::types::{Flaw, Rgb};
 
-/// Sizes that are tried one after another, longer and shorter side in pixels: most multiples that models need divide one of them.
+/// Sizes of probe frames, tried in this order; longer and shorter side in pixels. Most multiples that models need divide one of them.
 const SIZES: [[usize; 2]; 3] = [[144, 96], [160, 120], [128, 128]];
 
 /// Results of a model on dark frames.
 pub(super) struct Trials<const N: usize> {
-    /// The frames as they were fed.
+    /// The frames, in the size in which they were fed.
     pub(super) frames: Vec<Rgb>,
     /// Results by convention.
     pub(super) probes: [Probe; N],
 }
 
 impl Enhancer {
-    /// Tries the model on dark frames, and decides in which value ranges it is fed and read where they are not stated.
+    /// Runs the model on dark frames, and chooses the value ranges that are not stated.
     ///
     /// # Errors
-    /// If its images are implausible, or several ranges would do, with the lines of a sidecar that would repair it; not if
-    /// implausible images are used.
+    /// If the images are implausible or the ranges ambiguous, unless implausible images are accepted. The message proposes sidecar lines.
     pub fn probe(&mut self, dark: &[Rgb], implausible: Implausible) -> Result<()> {
         let mut trials = self.trials(dark, [self.convention()], self.stated_ranges())?;
         if let (None, Some(frame)) = (&trials, dark.first()) {
-            // It may take the size of a frame, or show which sizes it takes.
+            // The model may accept the frame's own size, or its accepted sizes are found by trial.
             self.enhance(frame)?;
             trials = self.trials(dark, [self.convention()], self.stated_ranges())?;
         }
@@ -45,7 +44,7 @@ impl Enhancer {
             probes: [probe], ..
         }) = trials
         else {
-            warn_of_untried(self.name());
+            warn_not_probed(self.name());
             return Ok(());
         };
         let outcome = match probe.conclusion() {
@@ -56,7 +55,7 @@ impl Enhancer {
         let problem = self.problem(&probe, dark)?;
         match (&problem, outcome, implausible) {
             (Some(problem), ProbeOutcome::Overruled, Implausible::Refused) => {
-                return Err(self.fault(format!("{problem}. {}", way_out(self.path()))));
+                return Err(self.error(format!("{problem}. {}", doctor_advice(self.path()))));
             }
             (Some(problem), ..) => tracing::warn!("{}: {problem}", self.name()),
             (None, ..) => {}
@@ -70,9 +69,9 @@ impl Enhancer {
         if let Some(remark) = &no_image {
             self.remark(remark);
         }
-        self.warn_of_remarks();
+        self.log_remarks();
         if probe.conclusion() == Conclusion::Assumed {
-            self.warn_of_assumed(probe.usual, no_image.is_none());
+            self.warn_ranges_assumed(probe.usual, no_image.is_none());
         }
         let note = ProbeNote {
             frames: dark.len(),
@@ -80,19 +79,19 @@ impl Enhancer {
             problem,
             outcome,
         };
-        self.set_probed(note)
+        self.set_probe_result(note)
     }
 
-    /// Flaw of a probe's images, with a remedy; `None` if they are plausible. If lines of the sidecar are wrong, the right ones are found
-    /// by trial.
+    /// Message about the flaw of a probe's images, with a remedy; `None` if they are plausible. Without a preset, corrected sidecar lines
+    /// are searched by trial.
     fn problem(&self, probe: &Probe, dark: &[Rgb]) -> Result<Option<String>> {
         let problem = match probe.conclusion() {
-            // The convention of a preset's authors is not contradicted.
+            // A preset's convention comes from the authors' code, so no other one is proposed.
             Conclusion::Implausible(seen) | Conclusion::Doubtful(seen)
                 if !self.follows_preset() =>
             {
                 let better = match (self.better_lines(dark)?, seen.example.flaw) {
-                    // Noise, as of random weights, is no residual and no map.
+                    // Noise, such as the output of random weights, is neither a residual nor a map.
                     (None, Flaw::Shuffled) => None,
                     (None, flaw) => self.better_expression(dark, flaw)?,
                     (lines, _) => lines,
@@ -111,22 +110,25 @@ impl Enhancer {
             .map_or(String::new(), |unread| {
                 format!(". Perhaps another output is needed: {unread}")
             });
-        Ok(Some(sidecar::named(&(problem + &unread), self.path())))
+        Ok(Some(sidecar::insert_sidecar_name(
+            &(problem + &unread),
+            self.path(),
+        )))
     }
 
-    /// The output that is read, as a term of a sidecar's expression.
+    /// The present image output, as a term of an expression.
     fn read_output(&self) -> String {
         match &self.graph().convention.image {
             Some(image) => format!("({image})"),
-            None => in_expression(&self.graph().signature.outputs[0].port.name),
+            None => expression_name(&self.graph().signature.outputs[0].port.name),
         }
     }
 
-    /// Enhances a frame in a condition, and looks at the result; with what its note got from it.
+    /// Enhances the image of a frame and condition (`place`), judges the result, and returns it with its contribution to the usage record.
     ///
     /// # Errors
-    /// As by [`Self::enhance`], and if most of its images of dark frames so far are implausible.
-    pub fn enhance_noted(
+    /// As [`Self::enhance`], and if most images of dark frames so far are implausible.
+    pub fn enhance_and_judge(
         &mut self,
         image: &Rgb,
         place: [&dyn ToString; 2],
@@ -135,39 +137,39 @@ impl Enhancer {
         let before = self.sizes().clone();
         let enhanced = self.enhance(image)?;
         let used = ImageUse {
-            // Looked at in any case: another run may read the image from a store and look for such images.
-            seen: Seen::on([image, &enhanced]),
+            // Judged in any case, because another run that reads the image from a store may need the judgement.
+            seen: Judgement::on([image, &enhanced]),
             sizes: self.sizes().since(&before),
         };
         self.judge(&used.seen, place, implausible)?;
         Ok((enhanced, used))
     }
 
-    /// Notes an image of a frame in a condition that it made in another run or process, as if it was made now.
+    /// Records an image of a frame and condition (`place`) from another run or process, as if it was enhanced now.
     ///
     /// # Errors
-    /// If most of its images of dark frames so far are implausible.
-    pub fn note_stored(
+    /// If most images of dark frames so far are implausible.
+    pub fn judge_stored(
         &self,
         used: &ImageUse,
         place: [&dyn ToString; 2],
         implausible: Implausible,
     ) -> Result<()> {
-        used.note_in(&self.usage(), self.path(), place, implausible)
+        used.record(&self.usage(), self.path(), place, implausible)
     }
 
     fn judge(
         &self,
-        seen: &Seen,
+        seen: &Judgement,
         place: [&dyn ToString; 2],
         implausible: Implausible,
     ) -> Result<()> {
-        seen.judge_in(&self.usage(), self.path(), place, implausible)
+        seen.record(&self.usage(), self.path(), place, implausible)
     }
 
-    /// Runs the model on dark frames by each of these conventions, which differ in how the output is read, and with each pair of ranges
-    /// that is not stated. Where the usual pair is implausible, pairs with a mean and a deviation are tried too, and all are ranked by the
-    /// output for black and white. Returns `None` if the model fails at all sizes that are tried.
+    /// Runs the model on dark frames in each of these conventions, which differ only in the decoding of the output, with each pair of
+    /// ranges that the stated ones allow. If the usual pair is implausible, normalised pairs are tried, too, and all are ranked by the
+    /// outputs for black and white. Returns `None` if the model fails at all sizes of the probe.
     pub(super) fn trials<const N: usize>(
         &self,
         dark: &[Rgb],
@@ -176,9 +178,9 @@ impl Enhancer {
     ) -> Result<Option<Trials<N>>> {
         let usual = self.ranges();
         let ranges = match (input, output) {
-            (Some(_), Some(_)) => Ranges::Stated,
-            (None, None) => Ranges::Open,
-            _ => Ranges::OneStated,
+            (Some(_), Some(_)) => StatedRanges::Both,
+            (None, None) => StatedRanges::Neither,
+            _ => StatedRanges::One,
         };
         for size in SIZES {
             let frames: Vec<Rgb> = dark
@@ -200,7 +202,7 @@ impl Enhancer {
                 if !self.is_dim(&probes[0], conventions[0])? && self.may_be_normalised(input) {
                     let pairs = RangePair::normalised(input, output);
                     for fed_alike in pairs.chunk_by(|a, b| a.input == b.input) {
-                        // The sizes are those of the plain ranges, so what fails here is no reason to try others.
+                        // The plain ranges have shown that this size works, so a failure here is no reason to try another.
                         let more = self.pair_trials(&frames, conventions, fed_alike)?;
                         for (probe, pairs) in probes.iter_mut().zip(more.into_iter().flatten()) {
                             probe.pairs.extend(pairs);
@@ -216,7 +218,7 @@ impl Enhancer {
         Ok(None)
     }
 
-    /// Whether the images in the usual ranges are merely dim: not brighter, but with black and white near to themselves.
+    /// True if the images in the usual ranges are merely dim: not brighter, but with black and white preserved.
     fn is_dim(&self, probe: &Probe, convention: &ModelSidecar) -> Result<bool> {
         let verdict = probe.usual_pair().and_then(PairTrial::verdict);
         if verdict.is_none_or(|seen| seen.example.flaw != Flaw::Unlit) {
@@ -226,7 +228,7 @@ impl Enhancer {
         Ok(endpoints.is_some_and(Endpoints::are_near))
     }
 
-    /// Images of the frames by each of these conventions, with each pair of ranges. The model runs once for each frame and input range.
+    /// Trials of the frames in each of these conventions with each pair of ranges. The model runs once for each frame and input range.
     /// Returns `None` if it fails on a frame.
     fn pair_trials<const N: usize>(
         &self,
@@ -234,7 +236,7 @@ impl Enhancer {
         conventions: [&ModelSidecar; N],
         ranges: &[RangePair],
     ) -> Result<Option<[Vec<PairTrial>; N]>> {
-        let seen: Vec<Codes> = frames.iter().map(Codes::from_rgb).collect();
+        let seen: Vec<UnclampedImage> = frames.iter().map(UnclampedImage::from_rgb).collect();
         let mut pairs = [(); N].map(|()| Vec::new());
         for fed_alike in ranges.chunk_by(|a, b| a.input == b.input) {
             let graphs: Vec<Graph> = conventions
@@ -245,7 +247,7 @@ impl Enhancer {
                         .map(|ranges| self.read_by(convention, *ranges))
                 })
                 .collect::<Result<_>>()?;
-            let Some(made) = made(&graphs, frames)? else {
+            let Some(made) = run_frames(&graphs, frames)? else {
                 return Ok(None);
             };
             let mut made = made.into_iter();
@@ -257,7 +259,7 @@ impl Enhancer {
         Ok(Some(pairs))
     }
 
-    /// Ranks the pairs of a probe by the output for black and white, which is measured for the plausible ones.
+    /// Measures the outputs for black and white of the plausible pairs, and ranks the pairs by them.
     fn rank(&self, probe: &mut Probe, convention: &ModelSidecar) -> Result<()> {
         for pair in &mut probe.pairs {
             if pair.verdict().is_none() {
@@ -268,8 +270,8 @@ impl Enhancer {
         Ok(())
     }
 
-    /// Warns that nothing states the value ranges. Lines that confirm them are proposed if the output seems to be the image.
-    fn warn_of_assumed(&self, usual: RangePair, is_image: bool) {
+    /// Warns that the value ranges are assumed. If the output seems to be the image, the message proposes lines that confirm them.
+    fn warn_ranges_assumed(&self, usual: RangePair, is_image: bool) {
         let lines = if is_image {
             format!(". To confirm, {ADD}: {}", usual.stated())
         } else {
@@ -278,12 +280,11 @@ impl Enhancer {
         let words = format!(
             "value ranges of {usual} assumed, because nothing sets them; its images of dark frames are plausible{lines}"
         );
-        let words = sidecar::named(&words, self.path());
+        let words = sidecar::insert_sidecar_name(&words, self.path());
         tracing::warn!("{}: {words}", self.name());
     }
 
-    /// The output for black and white by a convention with these ranges; `None` if the model fails on the image or its output has values
-    /// that are not finite.
+    /// Outputs for black and white in a convention with these ranges; `None` if the model fails or its output is not finite.
     ///
     /// # Errors
     /// If the runtime fails.
@@ -294,20 +295,23 @@ impl Enhancer {
     ) -> Result<Option<Endpoints>> {
         let graph = self.read_by(convention, ranges)?;
         let image = black_and_white(self.probe_size(endpoints::SIZE));
-        let made = made(&[graph], &[image])?;
+        let made = run_frames(&[graph], &[image])?;
         let codes = made.into_iter().flatten().flatten().next();
         let endpoints = codes.as_ref().map(Endpoints::from_codes);
         Ok(endpoints.filter(|endpoints| endpoints.distance.is_finite()))
     }
 
-    /// The model, fed and read by a convention with these ranges.
+    /// The model's graph in a convention with these ranges.
     pub(super) fn read_by(&self, convention: &ModelSidecar, ranges: RangePair) -> Result<Graph> {
-        let convention = convention.clone().fed(ranges.input).read(ranges.output);
+        let convention = convention
+            .clone()
+            .with_input_scale(ranges.input)
+            .with_output_scale(ranges.output);
         let graph = self.graph().with_convention(convention);
-        graph.map_err(|problem| self.fault(problem))
+        graph.map_err(|problem| self.error(problem))
     }
 
-    /// A frame in a size of the probe, or in the size that the graph fixes.
+    /// A frame resized to a size of the probe, or to the model's fixed size.
     pub(super) fn probe_image(&self, frame: &Rgb, [longer, shorter]: [usize; 2]) -> Result<Rgb> {
         let size = if frame.height() > frame.width() {
             [longer, shorter]
@@ -316,9 +320,9 @@ impl Enhancer {
         };
         let [height, width] = self.probe_size(size);
         let planes = Planes::from_rgb(frame).resized(height, width);
-        let planes = planes.map_err(|problem| self.fault(problem))?;
+        let planes = planes.map_err(|problem| self.error(problem))?;
         planes
             .to_rgb(Rounding::Round)
-            .ok_or_else(|| self.fault("a frame of the probe has no pixel"))
+            .ok_or_else(|| self.error("a frame of the probe has no pixel"))
     }
 }

@@ -4,7 +4,7 @@ use std::fmt;
 
 use crate::conventions::{ValueRange, ValueScale};
 
-/// The range in which a model is fed, and the one in which it is read.
+/// Scale of the values of a model's input, and that of its output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct RangePair {
     pub(crate) input: ValueScale,
@@ -12,13 +12,13 @@ pub(crate) struct RangePair {
 }
 
 impl RangePair {
-    /// The pairs of plain ranges with these; `None` stands for each range in turn.
+    /// All pairs of plain ranges with these stated ranges; `None` stands for every range.
     pub(super) fn plain(input: Option<ValueRange>, output: Option<ValueRange>) -> Vec<Self> {
         let ranges = ValueRange::ALL.map(ValueScale::Range);
         pairs(&scales(input, &ranges), &scales(output, &ranges))
     }
 
-    /// The pairs with a mean and a deviation at either end or both; `None` stands for each range in turn, with and without them.
+    /// All pairs that are normalised by a mean and a deviation on at least one side; `None` stands for every scale.
     pub(super) fn normalised(input: Option<ValueRange>, output: Option<ValueRange>) -> Vec<Self> {
         let mut all = pairs(
             &scales(input, &ValueScale::ALL),
@@ -28,13 +28,18 @@ impl RangePair {
         all
     }
 
-    /// Whether neither side has a mean and a deviation.
+    /// True if neither side is normalised.
     pub(super) fn is_plain(self) -> bool {
-        let is_range = |scale| matches!(scale, ValueScale::Range(_));
-        is_range(self.input) && is_range(self.output)
+        matches!(
+            self,
+            Self {
+                input: ValueScale::Range(_),
+                output: ValueScale::Range(_)
+            }
+        )
     }
 
-    /// The lines of a sidecar that state it.
+    /// Sidecar lines that state the pair.
     pub(super) fn lines(self) -> Vec<String> {
         let mut lines = scale_lines(self.input, ["range_in", "mean", "std"]);
         lines.extend(scale_lines(
@@ -44,7 +49,7 @@ impl RangePair {
         lines
     }
 
-    /// These lines in a sentence.
+    /// The lines of [`Self::lines`], joined for a sentence.
     pub(super) fn stated(self) -> String {
         self.lines()
             .into_iter()
@@ -60,7 +65,7 @@ impl fmt::Display for RangePair {
     }
 }
 
-/// The stated range alone, or all of these.
+/// Only the stated range, or `all` scales if none is stated.
 fn scales(stated: Option<ValueRange>, all: &[ValueScale]) -> Vec<ValueScale> {
     match stated {
         Some(range) => vec![ValueScale::Range(range)],
@@ -68,7 +73,7 @@ fn scales(stated: Option<ValueRange>, all: &[ValueScale]) -> Vec<ValueScale> {
     }
 }
 
-/// Each input with each output, those of the same input in a row.
+/// Each input scale with each output scale, grouped by input.
 fn pairs(inputs: &[ValueScale], outputs: &[ValueScale]) -> Vec<RangePair> {
     inputs
         .iter()
@@ -80,7 +85,7 @@ fn pairs(inputs: &[ValueScale], outputs: &[ValueScale]) -> Vec<RangePair> {
         .collect()
 }
 
-/// The lines of a sidecar for one side; the keys are those of a range, a mean and a deviation.
+/// Sidecar lines for one side, with its keys for range, mean and deviation.
 fn scale_lines(scale: ValueScale, [range, mean, std]: [&str; 3]) -> Vec<String> {
     match scale.mean_and_std() {
         None => vec![format!("{range} = \"{}\"", scale.range())],

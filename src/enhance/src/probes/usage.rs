@@ -1,4 +1,4 @@
-//! Counters of an enhancer in a run, shared by all threads that use it ([`Usage`]), and the reaction to implausible images
+//! Record of an enhancer's convention and counts in a run, shared by all threads ([`Usage`]), and the reaction to implausible images
 //! ([`Implausible`]).
 
 use std::collections::{BTreeMap, HashSet};
@@ -7,63 +7,66 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use serde::{Deserialize, Serialize};
 
-use super::plausible::{Codes, DARK, Gravity, Verdict, brightness, judge};
+use super::plausible::{DARK, Gravity, UnclampedImage, Verdict, brightness, judge};
 use darkqa_ground::error::{Error, Result};
 use darkqa_ground::types::manifests::{ConventionLine, ELSEWHERE, EnhancerNote, FlawedImage};
 use darkqa_ground::types::{Digest, Rgb, SizeLog};
 
-/// Number of dark images from which on a verdict on the enhancer is possible; chosen as the number of frames of the probe.
-const ENOUGH: usize = super::probe::FRAMES;
-/// Number of the twin that stands for images that were read from a store.
-const STORED: usize = usize::MAX;
+/// Minimum number of dark images for a verdict on the enhancer; chosen as the number of frames of the probe.
+const MIN_JUDGED: usize = super::probe::FRAMES;
+/// Index in place of a twin's for images that were read from a store.
+const STORED_TWIN: usize = usize::MAX;
 
 /// Reaction to a model with implausible images.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Implausible {
-    /// It is refused.
+    /// Refuse the model.
     #[default]
     Refused,
-    /// It is used (`--allow bad-enhancer`).
+    /// Use the model (`--allow bad-enhancer`).
     Used,
-    /// Its images are not looked at, because they are those of a run that is there.
+    /// Do not judge images, because they belong to a finished run.
     NotLookedFor,
 }
 
-/// Finding about one enhanced image.
+/// Judgement of one enhanced image.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub(super) enum Seen {
-    /// It was not looked at, because the degraded image is not dark: good models fail the rules on those.
+pub(super) enum Judgement {
+    /// Not judged, because the degraded image is bright; good models fail the rules on bright images.
     #[default]
     Bright,
-    /// The degraded image is dark. Holds the flaw of the enhanced one, if it has one.
+    /// Flaw of the enhanced image, if any; the degraded image is dark.
     Dark(Option<Verdict>),
 }
 
-impl Seen {
+impl Judgement {
     /// Compares the enhanced image with the degraded one.
     pub(super) fn on([degraded, made]: [&Rgb; 2]) -> Self {
         if brightness(degraded) > DARK {
             Self::Bright
         } else {
-            Self::Dark(judge(&Codes::small(degraded), &Codes::small(made)))
+            Self::Dark(judge(
+                &UnclampedImage::downscaled(degraded),
+                &UnclampedImage::downscaled(made),
+            ))
         }
     }
 }
 
-/// Contribution of one image to the enhancer's note; stored with the image.
+/// Contribution of one image to the enhancer's usage record; stored with the image.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ImageUse {
-    pub(super) seen: Seen,
+    pub(super) seen: Judgement,
     /// How the size of the image was handled.
     pub(super) sizes: SizeLog,
 }
 
 impl ImageUse {
-    /// Notes an image of a frame in a condition that was made in another run or process, as if the enhancer in this file made it now.
+    /// Records an image of a frame and condition (`place`) from another run or process, as if the enhancer in the file `model` made it now.
     ///
     /// # Errors
     /// If most of its images of dark frames so far are implausible.
-    pub fn note_in(
+    pub fn record(
         &self,
         usage: &Usage,
         model: &Path,
@@ -71,25 +74,25 @@ impl ImageUse {
         implausible: Implausible,
     ) -> Result<()> {
         usage.add_sizes_of_stored(&self.sizes);
-        self.seen.judge_in(usage, model, place, implausible)
+        self.seen.record(usage, model, place, implausible)
     }
 }
 
 impl ImageUse {
-    /// The use of an image that was enhanced elsewhere, made of a degraded one.
+    /// Contribution of an image that another program enhanced.
     #[must_use]
-    pub fn made_elsewhere([degraded, made]: [&Rgb; 2]) -> Self {
+    pub fn for_external([degraded, made]: [&Rgb; 2]) -> Self {
         Self {
-            seen: Seen::on([degraded, made]),
+            seen: Judgement::on([degraded, made]),
             sizes: SizeLog::default(),
         }
     }
 
-    /// Notes an image of a frame in a condition that was enhanced elsewhere.
+    /// Records an image of a frame and condition (`place`) that another program enhanced.
     ///
     /// # Errors
-    /// If most images of dark frames so far are implausible; names the folder.
-    pub fn note_made_elsewhere(
+    /// If most images of dark frames so far are implausible; the message names the folder.
+    pub fn record_external(
         &self,
         usage: &Usage,
         folder: &Path,
@@ -104,12 +107,12 @@ impl ImageUse {
     }
 }
 
-impl Seen {
-    /// Counts the finding about a frame's image in a condition, unless images are not checked. The model is named by its file.
+impl Judgement {
+    /// Counts the judgement of the image of a frame and condition (`place`), unless images are not judged.
     ///
     /// # Errors
     /// If most images of dark frames so far are implausible.
-    pub(super) fn judge_in(
+    pub(super) fn record(
         &self,
         usage: &Usage,
         model: &Path,
@@ -119,38 +122,38 @@ impl Seen {
         let judged = usage.judge(self, place, implausible);
         judged.map_err(|problem| Error::EnhancerEnded {
             path: model.to_owned(),
-            problem: format!("{problem}. {}", way_out(model)),
+            problem: format!("{problem}. {}", doctor_advice(model)),
         })
     }
 }
 
-/// What to do about an enhancer whose images are implausible, as a sentence.
-pub(super) fn way_out(model: &Path) -> String {
+/// Sentence with the options for an enhancer whose images are implausible.
+pub(super) fn doctor_advice(model: &Path) -> String {
     format!(
         "`darkqa-eval enhance doctor {} IMAGES… --out DIR` tries each value range and colour order; --allow bad-enhancer uses it anyway",
         model.display()
     )
 }
 
-/// A handle to the note of an enhancer, which grows while it is used.
+/// Shared handle to the usage record of an enhancer, which is updated with each image.
 #[derive(Debug, Clone, Default)]
 pub struct Usage(Arc<Mutex<UsageState>>);
 
 #[derive(Debug, Default)]
 struct UsageState {
     note: EnhancerNote,
-    /// Number of images that are implausible.
+    /// Number of images whose flaw is impossible.
     impossible: usize,
-    /// The digests of the frames and conditions whose images were looked at.
+    /// Digests of the frames and conditions whose images were judged.
     judged: HashSet<Digest>,
     /// Size adaptations by twin.
     sizes: BTreeMap<usize, SizeLog>,
 }
 
 impl Usage {
-    /// The handle of images that were enhanced elsewhere.
+    /// A usage record for images that another program enhanced.
     #[must_use]
-    pub fn made_elsewhere() -> Self {
+    pub fn for_external() -> Self {
         let usage = Self::default();
         usage.update(|note| {
             note.convention.push(ConventionLine {
@@ -162,12 +165,12 @@ impl Usage {
         usage
     }
 
-    /// The note as it is now.
+    /// Copy of the record's present state.
     pub fn note(&self) -> EnhancerNote {
         self.with(|state| state.note.clone())
     }
 
-    /// Notes what a twin did so far because of sizes.
+    /// Sets the counts of whole, padded and tiled images of a twin.
     pub(crate) fn set_sizes(&self, twin: usize, log: &SizeLog) {
         self.change_sizes(twin, |sizes| sizes.clone_from(log));
     }
@@ -183,32 +186,32 @@ impl Usage {
         });
     }
 
-    /// Adds the size adaptations of an image that was made earlier and is read now.
+    /// Adds the counts of an image that was read from a store.
     pub(super) fn add_sizes_of_stored(&self, log: &SizeLog) {
-        self.change_sizes(STORED, |sizes| sizes.add(log));
+        self.change_sizes(STORED_TWIN, |sizes| sizes.add(log));
     }
 
-    /// Resets the size adaptations of stored images.
-    pub(crate) fn count_stored_anew(&self) {
-        self.set_sizes(STORED, &SizeLog::default());
+    /// Resets the counts of stored images.
+    pub(crate) fn reset_stored_counts(&self) {
+        self.set_sizes(STORED_TWIN, &SizeLog::default());
     }
 
-    /// Changes the note.
+    /// Changes the record.
     pub(crate) fn update(&self, change: impl FnOnce(&mut EnhancerNote)) {
         self.with(|state| change(&mut state.note));
     }
 
-    /// Counts the finding about a frame's image in a condition; an image that is made again counts once.
+    /// Counts the judgement of an image. An image of the same frame and condition counts once.
     ///
     /// # Errors
-    /// The finding, if more than half of at least six images are implausible, unless such images are used.
+    /// A message, if more than half of at least six images are implausible and such images are refused.
     pub(super) fn judge(
         &self,
-        seen: &Seen,
+        seen: &Judgement,
         [frame, condition]: [&dyn ToString; 2],
         implausible: Implausible,
     ) -> Result<(), String> {
-        let &Seen::Dark(verdict) = seen else {
+        let &Judgement::Dark(verdict) = seen else {
             return Ok(());
         };
         if implausible == Implausible::NotLookedFor {
@@ -232,7 +235,7 @@ impl Usage {
             let judged = state.note.judged.images;
             match (impossible, implausible) {
                 (Some(example), Implausible::Refused)
-                    if judged >= ENOUGH && 2 * state.impossible > judged =>
+                    if judged >= MIN_JUDGED && 2 * state.impossible > judged =>
                 {
                     Err(format!(
                         "{} of its {judged} images of dark frames are implausible; they {example}",
@@ -253,7 +256,7 @@ impl Usage {
 mod tests {
     use super::*;
 
-    /// An image of squares of different light, `gain` times as bright.
+    /// An image of squares of different brightness, multiplied by `gain`.
     fn squares(gain: f32) -> Rgb {
         let samples = (0..96 * 96).flat_map(|place| {
             let light = (place / 12 % 8 * 5 + place / 1152 * 3) as f32;
@@ -263,7 +266,11 @@ mod tests {
     }
 
     fn judged(usage: &Usage, frame: usize, made: &Rgb, how: Implausible) -> Result<(), String> {
-        usage.judge(&Seen::on([&squares(1.0), made]), [&frame, &"L3+ev+m"], how)
+        usage.judge(
+            &Judgement::on([&squares(1.0), made]),
+            [&frame, &"L3+ev+m"],
+            how,
+        )
     }
 
     #[test]
@@ -289,7 +296,7 @@ mod tests {
         for frame in [0, 1, 0, 1, 1] {
             judged(&usage, frame, &flat, Implausible::Used).unwrap();
         }
-        let again = Seen::on([&squares(1.0), &flat]);
+        let again = Judgement::on([&squares(1.0), &flat]);
         usage
             .judge(&again, [&0, &"L4+ev+m"], Implausible::Used)
             .unwrap();
@@ -303,8 +310,8 @@ mod tests {
         let usage = Usage::default();
         let bright = squares(6.0);
         let made = Rgb::black(96, 96);
-        let seen = Seen::on([&bright, &made]);
-        assert_eq!(seen, Seen::Bright);
+        let seen = Judgement::on([&bright, &made]);
+        assert_eq!(seen, Judgement::Bright);
         usage
             .judge(&seen, [&"frame", &"L0"], Implausible::Refused)
             .unwrap();

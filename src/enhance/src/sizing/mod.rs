@@ -1,4 +1,4 @@
-//! Sizes of images that a model takes: whole, padded, in tiles, or found by trial.
+//! Input sizes of a model: whole images, padding, tiles, and sizes found by trial.
 
 pub(super) mod reach;
 mod size_plan;
@@ -7,8 +7,10 @@ mod sizes;
 mod texture;
 mod tiles;
 
-pub(super) use size_plan::{MAX_WHOLE, NoPlan, SeamRule, SizePlan, SizeRule, global, seams_differ};
-pub(super) use size_search::{MULTIPLES, SizeSearch, TakenSizes, not_found};
+pub(super) use size_plan::{
+    MAX_WHOLE, PlanError, SeamRule, SizePlan, SizeRule, not_local, seams_differ,
+};
+pub(super) use size_search::{AcceptedSizes, MULTIPLES, SizeSearch, sizes_not_found};
 pub(super) use sizes::{count_image, count_planned};
 pub(super) use texture::{CODES, texture};
 pub use tiles::Tiling;

@@ -1,51 +1,50 @@
-//! How far a pixel of a model's output depends on the image around it, by trial: [`Reach`], [`Context`].
+//! Measurement of a model's receptive field ([`Reach`]), and of the context and alignment of its tiles ([`Context`]).
 //!
-//! One pixel in the middle of a trial image is changed by one code. The farthest sample of the output that moves shows the
-//! reach: 7 pixels for Zero-DCE, as its seven 3 × 3 convolutions imply. A mean of the whole image moves too little with one pixel
-//! (2 · 10⁻⁷ for BrightsightNet at 512 × 512), so a quarter of the image is inverted, too, and counts if it moves what is far from it.
+//! One pixel in the middle of a trial image is changed by one code. The distance of the farthest output sample that changes is the reach:
+//! 7 pixels for Zero-DCE, as its seven 3 × 3 convolutions imply. A global mean changes too little with one pixel (2 · 10⁻⁷ for
+//! BrightsightNet at 512 × 512). So a quarter of the image is inverted, too, and changes far from that quarter also count.
 
 use super::size_plan::SizeRule;
 use super::texture::{CODES, texture};
-use crate::conventions::Tile;
+use crate::conventions::Locality;
 use crate::graphs::{Graph, RunResult};
 use crate::planes::Planes;
 use darkqa_ground::error;
 use darkqa_ground::types::Rgb;
 
-/// Difference of an output of 0..1 that counts as movement; above the last bits of 32-bit floats, below a thousandth of a
-/// code. Chosen.
-const MOVED: f32 = 1e-6;
+/// Minimum change of an output in 0..1 that counts; above rounding errors of 32-bit floats, below a thousandth of a code. Chosen.
+const MIN_CHANGE: f32 = 1e-6;
 
-/// Least context of a tile, in pixels, where a tile has room for it: some pixels more than most models need. Chosen.
-const LEAST_CONTEXT: usize = 8;
+/// Minimum context of a tile, in pixels, if the tile has room for it: slightly more than most models need. Chosen.
+const MIN_CONTEXT: usize = 8;
 
-/// Side of the trial image where the model takes any, in pixels; chosen.
+/// Side, in pixels, of the trial image for models that accept any size; chosen.
 pub(crate) const FREE_SIDE: usize = 128;
 
-/// Steps of pixels that tiles may have to start at, the smallest first: networks that halve an image up to five times.
+/// Multiples of pixels at which tiles may have to start, in ascending order, for networks that halve an image up to five times.
 const ALIGNMENTS: [usize; 16] = [1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24, 28, 32];
 
-/// Largest difference of outputs of 0..1 that count as the same; a tenth of a code. Chosen: above the rounding of other sums.
-const SAME: f32 = 4e-4;
+/// Maximum difference of outputs in 0..1 that count as equal: a tenth of a code. Chosen above the rounding of sums in another order.
+const MAX_EQUAL: f32 = 4e-4;
 
-/// Context and alignment of the tiles of a model, measured once if nothing states them.
+/// Context and alignment of a model's tiles, measured once if they are not stated.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Context {
     reach: Option<Result<Reach, String>>,
-    /// Tiles start at multiples of this number of pixels.
+    /// Multiple of pixels at which tiles start.
     alignment: Option<usize>,
 }
 
 impl Context {
-    /// Measures the context in pixels; the inner error explains why the model counts as global.
+    /// Context in pixels, stated or measured. The inner error explains why the model counts as global.
     pub(crate) fn measure(
         &mut self,
         graph: &Graph,
         rule: SizeRule,
     ) -> error::Result<Result<usize, String>> {
         match rule.tile {
-            Some(Tile::Exact(context)) => return Ok(Ok(context)),
-            Some(Tile::None) => {
+            Some(Locality::Exact(context)) => return Ok(Ok(context)),
+            Some(Locality::Global) => {
                 return Ok(Err(
                     "it needs the whole image (tile = \"none\" in MODEL.onnx.toml or the preset)"
                         .to_owned(),
@@ -53,7 +52,7 @@ impl Context {
             }
             None => {}
         }
-        let size = rule.whole([FREE_SIDE; 2]);
+        let size = rule.run_size([FREE_SIDE; 2]);
         if self.reach.is_none() {
             self.reach = Some(Reach::probe(graph, size)?);
             graph.restart_clock();
@@ -75,14 +74,14 @@ impl Context {
         Some(reach.0)
     }
 
-    /// Whether the alignment was not measured yet.
-    pub(crate) fn is_unaligned(&self) -> bool {
+    /// True if the alignment has not been measured yet.
+    pub(crate) fn lacks_alignment(&self) -> bool {
         self.alignment.is_none()
     }
 
-    /// Multiple at which tiles of this height and width must start to equal the whole image: 2 to the power of the number of poolings. 1 if
-    /// none is found; the comparison of seams then decides.
-    pub(crate) fn alignment(
+    /// Multiple at which tiles of this height and width must start to give the same result as the whole image: 2 to the power of the
+    /// number of pooling layers. 1 if none is found; the comparison of seams then detects wrong tiles.
+    pub(crate) fn measure_alignment(
         &mut self,
         graph: &Graph,
         tile: [usize; 2],
@@ -91,23 +90,23 @@ impl Context {
         if let Some(alignment) = self.alignment {
             return Ok(alignment);
         }
-        let found = alignment(graph, tile, context)?.unwrap_or(1);
+        let found = find_alignment(graph, tile, context)?.unwrap_or(1);
         graph.restart_clock();
         self.alignment = Some(found);
         Ok(found)
     }
 }
 
-/// The smallest of [`ALIGNMENTS`] by which an image may be moved without a change of the result, farther than the context from its
-/// edges; `None` if there is none.
-fn alignment(graph: &Graph, tile: [usize; 2], context: usize) -> error::Result<Option<usize>> {
+/// Smallest of [`ALIGNMENTS`] by which the input can be shifted without changing the output, except within the context of the edges; `None`
+/// without one.
+fn find_alignment(graph: &Graph, tile: [usize; 2], context: usize) -> error::Result<Option<usize>> {
     let largest = ALIGNMENTS[ALIGNMENTS.len() - 1];
     let scene = texture(tile.map(|side| side + largest), &CODES[0]);
-    let Ok(still) = output(graph, &part(&scene, tile, 0))? else {
+    let Ok(still) = run_trial(graph, &crop(&scene, tile, 0))? else {
         return Ok(None);
     };
     for shift in ALIGNMENTS {
-        let Ok(moved) = output(graph, &part(&scene, tile, shift))? else {
+        let Ok(moved) = run_trial(graph, &crop(&scene, tile, shift))? else {
             return Ok(None);
         };
         if same_interior(&still, &moved, shift, context) {
@@ -117,8 +116,8 @@ fn alignment(graph: &Graph, tile: [usize; 2], context: usize) -> error::Result<O
     Ok(None)
 }
 
-/// The part of an image that begins at this row and column.
-fn part(scene: &Rgb, [height, width]: [usize; 2], start: usize) -> Planes {
+/// Crops an image to this size, starting at row and column `start`.
+fn crop(scene: &Rgb, [height, width]: [usize; 2], start: usize) -> Planes {
     let mut part = Rgb::black(height, width);
     let rows = scene.samples().chunks_exact(3 * scene.width()).skip(start);
     let lines = part.samples_mut().chunks_exact_mut(3 * width);
@@ -128,7 +127,7 @@ fn part(scene: &Rgb, [height, width]: [usize; 2], start: usize) -> Planes {
     Planes::from_rgb(&part)
 }
 
-/// Whether an output and that of the moved image agree where both are farther than `margin` from their edges.
+/// True if the output of an image and that of the shifted image agree where both are farther than `margin` from their edges.
 fn same_interior(still: &Planes, moved: &Planes, shift: usize, margin: usize) -> bool {
     let (height, width) = (still.height, still.width);
     let rows = margin..(height - shift.min(height)).saturating_sub(margin);
@@ -140,16 +139,15 @@ fn same_interior(still: &Planes, moved: &Planes, shift: usize, margin: usize) ->
         && (0..channels).all(|channel| {
             rows.clone().all(|row| {
                 columns.clone().all(|column| {
-                    let at = |row: usize, column: usize| channel * plane + row * width + column;
-                    let was = still.samples[at(row + shift, column + shift)];
-                    let is = moved.samples[at(row, column)];
-                    (was - is).abs() <= SAME
+                    let index = channel * plane + row * width + column;
+                    let shifted_index = index + shift * width + shift;
+                    (still.samples[shifted_index] - moved.samples[index]).abs() <= MAX_EQUAL
                 })
             })
         })
 }
 
-/// Farthest pixels, along a side, on which a pixel of the output depends.
+/// Maximum distance, along a side, of the input pixels on which an output pixel depends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Reach(usize);
 
@@ -159,7 +157,7 @@ impl Reach {
         let mut farthest = 0;
         for codes in &CODES {
             let mut image = texture(size, codes);
-            let before = match output(graph, &Planes::from_rgb(&image))? {
+            let before = match run_trial(graph, &Planes::from_rgb(&image))? {
                 Ok(before) => before,
                 Err(problem) => return Ok(Err(problem)),
             };
@@ -168,12 +166,12 @@ impl Reach {
             for sample in &mut image.samples_mut()[at..at + 3] {
                 *sample += 1;
             }
-            let after = match output(graph, &Planes::from_rgb(&image))? {
+            let after = match run_trial(graph, &Planes::from_rgb(&image))? {
                 Ok(after) => after,
                 Err(problem) => return Ok(Err(problem)),
             };
             let corner = Planes::from_rgb(&with_inverted_corner(&image, middle));
-            let corner = match output(graph, &corner)? {
+            let corner = match run_trial(graph, &corner)? {
                 Ok(corner) => corner,
                 Err(problem) => return Ok(Err(problem)),
             };
@@ -184,30 +182,28 @@ impl Reach {
         Ok(Ok(Self(farthest)))
     }
 
-    /// Context that tiles of such sides need, in pixels; `None` if the reach is more than a quarter of a tile, so that the
-    /// model counts as global.
+    /// Context for tiles of this height and width, in pixels; `None` if the reach exceeds a quarter of a side, so that the model counts as
+    /// global.
     fn context(self, tile: [usize; 2]) -> Option<usize> {
         let quarter = tile[0].min(tile[1]) / 4;
-        (self.0 <= quarter).then(|| self.0.max(LEAST_CONTEXT.min(quarter)))
+        (self.0 <= quarter).then(|| self.0.max(MIN_CONTEXT.min(quarter)))
     }
 }
 
-/// Output of a trial; the inner error explains why it failed.
-fn output(graph: &Graph, planes: &Planes) -> error::Result<Result<Planes, String>> {
+/// Runs a trial; the inner error is a message about a failure of the model.
+fn run_trial(graph: &Graph, planes: &Planes) -> error::Result<Result<Planes, String>> {
     graph.restart_clock();
-    let unmeasured = |why: &str| {
-        Err(format!(
-            "the context that a pixel needs cannot be measured: the model {why}"
-        ))
+    let why = match graph.run_planes(planes)? {
+        RunResult::Output(planes) => return Ok(Ok(planes)),
+        RunResult::Failed(failure) => failure.message(),
+        RunResult::Unusable(_) => "gave values outside its range".to_owned(),
     };
-    Ok(match graph.planes(planes)? {
-        RunResult::Output(planes) => Ok(planes),
-        RunResult::Failed(failure) => unmeasured(&failure.words()),
-        RunResult::Unusable(_) => unmeasured("gave values outside its range"),
-    })
+    Ok(Err(format!(
+        "the context that a pixel needs cannot be measured: the model {why}"
+    )))
 }
 
-/// The image with inverted codes from this row and column on.
+/// Inverts the codes of an image in the rectangle from this row and column to the bottom right corner.
 fn with_inverted_corner(image: &Rgb, [top, left]: [usize; 2]) -> Rgb {
     let (mut changed, width) = (image.clone(), image.width());
     for row in changed.samples_mut().chunks_exact_mut(3 * width).skip(top) {
@@ -218,17 +214,17 @@ fn with_inverted_corner(image: &Rgb, [top, left]: [usize; 2]) -> Rgb {
     changed
 }
 
-/// Distance, along a side, of the farthest sample that differs from `middle`.
+/// Maximum distance, along a side, between `middle` and the changed samples.
 fn farthest_moved(before: &Planes, after: &Planes, middle: [usize; 2]) -> usize {
-    moved(before, after, MOVED)
+    changed_pixels(before, after, MIN_CHANGE)
         .map(|[y, x]| y.abs_diff(middle[0]).max(x.abs_diff(middle[1])))
         .max()
         .unwrap_or(0)
 }
 
-/// Distance, along a side, of the farthest sample that differs from the rows and columns from `corner` on; 0 if all are in them.
+/// Maximum distance, along a side, between the changed samples and the rectangle from `corner` to the bottom right; 0 if all are within it.
 fn farthest_from_corner(before: &Planes, after: &Planes, corner: [usize; 2]) -> usize {
-    moved(before, after, SAME)
+    changed_pixels(before, after, MAX_EQUAL)
         .map(|[y, x]| {
             let above = corner[0].saturating_sub(y);
             above.max(corner[1].saturating_sub(x))
@@ -237,8 +233,8 @@ fn farthest_from_corner(before: &Planes, after: &Planes, corner: [usize; 2]) -> 
         .unwrap_or(0)
 }
 
-/// Rows and columns of the samples that differ by more than `limit`; two NaNs do not differ.
-fn moved<'a>(
+/// Rows and columns of the samples that differ by more than `limit`; NaN does not count as different.
+fn changed_pixels<'a>(
     before: &'a Planes,
     after: &'a Planes,
     limit: f32,
@@ -260,55 +256,67 @@ fn moved<'a>(
 mod tests {
     use super::*;
 
-    #[test]
-    fn the_farthest_moved_sample_counts() {
-        let planes = |samples: Vec<f32>| Planes {
+    /// An image of 5 × 7 pixels.
+    fn small_planes(samples: Vec<f32>) -> Planes {
+        Planes {
             height: 5,
             width: 7,
             samples,
-        };
-        let before = planes(vec![0.5; 105]);
+        }
+    }
+
+    #[test]
+    fn farthest_changed_sample_counts() {
+        let before = small_planes(vec![0.5; 105]);
         let mut moved = before.samples.clone();
-        // Within the last bits; in the second plane, row 4, column 1; in the third, row 2, column 4.
+        // A change within rounding errors; one in the second plane at row 4, column 1; one in the third at row 2, column 4.
         moved[0] += 5e-7;
         moved[35 + 4 * 7 + 1] += 0.1;
         moved[70 + 2 * 7 + 4] -= 0.1;
-        assert_eq!(farthest_moved(&before, &planes(moved), [2, 3]), 2);
+        assert_eq!(farthest_moved(&before, &small_planes(moved), [2, 3]), 2);
         assert_eq!(farthest_moved(&before, &before, [2, 3]), 0);
         // The first sample is one row above the corner and two columns left of it.
         let mut moved = before.samples.clone();
         moved[7 + 1] += 0.01;
         moved[4 * 7 + 6] += 0.01;
-        assert_eq!(farthest_from_corner(&before, &planes(moved), [2, 3]), 2);
+        assert_eq!(
+            farthest_from_corner(&before, &small_planes(moved), [2, 3]),
+            2
+        );
     }
 
     #[test]
-    fn a_corner_is_inverted_from_its_row_and_column_on() {
+    fn corner_is_inverted() {
         let image = Rgb::new(2, 2, vec![10; 12]).unwrap();
         let changed = with_inverted_corner(&image, [1, 1]);
         assert_eq!(changed.samples()[..9], [10; 9]);
         assert_eq!(changed.samples()[9..], [245; 3]);
     }
 
-    #[test]
-    fn an_output_that_moves_with_the_image_is_the_same() {
-        let planes = |phase: usize| Planes {
+    /// A pattern of 12 × 12 pixels, shifted by this number of pixels.
+    fn shifted_pattern(shift: usize) -> Planes {
+        Planes {
             height: 12,
             width: 12,
             samples: (0..144)
-                .map(|i| ((i / 12 + phase) * 7 % 5 + (i % 12 + phase) * 3 % 11) as f32)
+                .map(|i| ((i / 12 + shift) * 7 % 5 + (i % 12 + shift) * 3 % 11) as f32)
                 .collect(),
-        };
-        assert!(same_interior(&planes(0), &planes(2), 2, 3));
-        assert!(!same_interior(&planes(0), &planes(3), 2, 3));
+        }
+    }
+
+    #[test]
+    fn shifted_outputs_agree_in_their_interior() {
+        let still = shifted_pattern(0);
+        assert!(same_interior(&still, &shifted_pattern(2), 2, 3));
+        assert!(!same_interior(&still, &shifted_pattern(3), 2, 3));
         assert!(
-            !same_interior(&planes(0), &planes(2), 2, 6),
+            !same_interior(&still, &shifted_pattern(2), 2, 6),
             "nothing is compared"
         );
     }
 
     #[test]
-    fn a_context_has_room_in_its_tile() {
+    fn context_fits_into_its_tile() {
         assert_eq!(Reach(7).context([512, 512]), Some(8));
         assert_eq!(Reach(12).context([48, 64]), Some(12));
         assert_eq!(Reach(13).context([48, 64]), None);

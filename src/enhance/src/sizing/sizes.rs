@@ -1,10 +1,10 @@
-//! How [`SizeLog`] counts an image by the plan of its sizes.
+//! Counts of enhanced images in a [`SizeLog`]: whole, padded and tiled.
 
 use super::size_plan::{SizePlan, SizeRule};
 use super::tiles::Seam;
 use darkqa_ground::types::SizeLog;
 
-/// Counts an image, and notes the sizes that its run had to have.
+/// Counts an image, and records the fixed size or the multiple that its run needed.
 pub(crate) fn count_image(log: &mut SizeLog, rule: SizeRule) {
     log.images += 1;
     if !rule.takes_any_size() {
@@ -16,7 +16,7 @@ pub(crate) fn count_image(log: &mut SizeLog, rule: SizeRule) {
     }
 }
 
-/// Counts an image of a height and width that went through whole, filled or in tiles.
+/// Counts an image of height and width `size` that was enhanced by a plan: whole, padded or in tiles.
 pub(crate) fn count_planned(
     log: &mut SizeLog,
     size: [usize; 2],
@@ -25,17 +25,17 @@ pub(crate) fn count_planned(
     seam: Seam,
 ) {
     count_image(log, rule);
-    let (is_padded, is_tiled) = (plan.cut.area != size, plan.tiles.count() > 1);
+    let (is_padded, is_tiled) = (plan.geometry.area != size, plan.tiles.count() > 1);
     log.whole += usize::from(!is_padded && !is_tiled);
     if is_padded {
         log.padded += 1;
         log.pad = Some(rule.pad.to_string());
     }
     if is_tiled {
-        let [height, width] = plan.fed();
+        let [height, width] = plan.run_size();
         log.tiled += 1;
         log.tile = log.tile.max(Some([width, height]));
-        log.context = log.context.max(Some(plan.cut.context));
+        log.context = log.context.max(Some(plan.geometry.context));
         log.seam.compared += seam.compared;
         log.seam.black += seam.black;
         log.seam.differing += seam.differing;

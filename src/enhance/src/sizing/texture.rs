@@ -1,14 +1,14 @@
-//! Images for trials of a model, made without one of the user's: [`texture`].
+//! Synthetic images for trials of a model: [`texture`].
 
 use std::ops::RangeInclusive;
 
 use darkqa_ground::types::Rgb;
 
-/// Codes of the trial images: one as dark as an underexposed photograph, one with the whole range, and one nearly black, for gates that
-/// brighter images saturate. Black is left out, as some models divide by it.
+/// Ranges of codes of the trial images: as dark as an underexposed photograph, the whole range, and nearly black for models whose gates
+/// saturate on brighter images. Code 0 is left out, because some models divide by it.
 pub(crate) const CODES: [RangeInclusive<u8>; 3] = [4..=40, 4..=251, 1..=12];
 
-/// An image whose samples look like noise within a range of codes, the same at each call.
+/// An image of pseudorandom samples within a range of codes; deterministic.
 pub(crate) fn texture([height, width]: [usize; 2], codes: &RangeInclusive<u8>) -> Rgb {
     let mut image = Rgb::black(height, width);
     let span = u32::from(codes.end() - codes.start()) + 1;
@@ -26,7 +26,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn textures_have_the_codes_and_are_the_same_each_time() {
+    fn textures_are_deterministic_and_within_the_range() {
         let image = texture([40, 60], &CODES[0]);
         assert_eq!(image, texture([40, 60], &CODES[0]));
         let codes = image.samples();

@@ -1,8 +1,8 @@
 //! Division of an image into tiles ([`TilePlan`], [`TileWindow`]), and the image made of their results ([`TiledImage`]).
 //!
-//! Each tile is enhanced with some context around it, and only its middle is used ("crop" tiling, as Real-ESRGAN's
-//! `tile_pad`). This is exact if pixels depend on nothing beyond the context; no blending hides a seam. Neighbours overlap
-//! by a few pixels ([`GUARD`] on either side). If these differ, pixels depend on more than the context.
+//! Each tile is enhanced with some context around it, and only its middle is used (like Real-ESRGAN's `tile_pad`), without blending. The
+//! result is exact if pixels depend on nothing beyond the context. To check this, the used parts of neighbours overlap by a few pixels
+//! ([`GUARD`] on either side); if these differ, pixels depend on more than the context.
 
 use std::fmt;
 use std::num::NonZeroUsize;
@@ -10,10 +10,10 @@ use std::str::FromStr;
 
 use darkqa_ground::types::Rgb;
 
-/// Pixels beyond a seam that a tile contributes too, for the comparison; chosen.
+/// Number of pixels beyond a seam that a tile provides for the comparison; chosen.
 pub(super) const GUARD: usize = 2;
 
-/// Largest code of a sample whose comparison shows nothing; chosen.
+/// Maximum code of samples that count as nearly black, so that their equality proves little; chosen.
 const NEARLY_BLACK: u8 = 2;
 
 /// Rectangle of an image, in pixels. `right` and `bottom` are exclusive and may lie outside the image.
@@ -79,7 +79,7 @@ impl FromStr for Tiling {
     }
 }
 
-/// One dimension of a tile: the pixels that the model gets, and those of them that are used of its output.
+/// Extent of a tile along one side: the pixels fed to the model, and the pixels used of its output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct TileSpan {
     pub(super) input_start: usize,
@@ -89,8 +89,8 @@ pub(crate) struct TileSpan {
 }
 
 impl TileWindow {
-    /// Part of the image that the model gets for a tile.
-    pub(crate) fn input_of(row: TileSpan, column: TileSpan) -> Self {
+    /// Part of the image that is fed to the model for a tile.
+    pub(crate) fn for_input(row: TileSpan, column: TileSpan) -> Self {
         Self {
             left: column.input_start,
             top: row.input_start,
@@ -100,7 +100,7 @@ impl TileWindow {
     }
 
     /// Part of a tile's output that is used, relative to its input.
-    pub(crate) fn output_of(row: TileSpan, column: TileSpan) -> Self {
+    pub(crate) fn for_output(row: TileSpan, column: TileSpan) -> Self {
         Self {
             left: column.output_start - column.input_start,
             top: row.output_start - row.input_start,
@@ -110,7 +110,7 @@ impl TileWindow {
     }
 }
 
-/// All tiles of an image, by their rows and columns.
+/// All tiles of an image, as rows and columns.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct TilePlan {
     rows: Vec<TileSpan>,
@@ -119,28 +119,33 @@ pub(crate) struct TilePlan {
 
 /// Area, size and context of tiles, in pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Cutting {
+pub(crate) struct TileGeometry {
     /// Height and width of the area that the tiles cover.
     pub(crate) area: [usize; 2],
     /// Largest height and width of a tile, context included.
     pub(super) tile: [usize; 2],
-    /// Pixels around the used part that the model gets too.
+    /// Number of pixels around the used part that are fed, too.
     pub(crate) context: usize,
-    /// Tiles begin at multiples of this number.
+    /// Multiple of pixels at which tiles start.
     pub(super) multiple: usize,
 }
 
 impl TilePlan {
     /// The tiles of an area; `None` if a tile is not larger than its context.
-    pub(super) fn new(cut: Cutting) -> Option<Self> {
-        let spans = |side: usize| spans(cut.area[side], cut.tile[side], cut.context, cut.multiple);
+    pub(super) fn new(geometry: TileGeometry) -> Option<Self> {
+        let TileGeometry {
+            area,
+            tile,
+            context,
+            multiple,
+        } = geometry;
         Some(Self {
-            rows: spans(0)?,
-            columns: spans(1)?,
+            rows: spans(area[0], tile[0], context, multiple)?,
+            columns: spans(area[1], tile[1], context, multiple)?,
         })
     }
 
-    /// The tiles row by row, each by its spans along both sides.
+    /// Tiles row by row, each as its vertical and horizontal extent.
     pub(crate) fn tiles(&self) -> impl Iterator<Item = (TileSpan, TileSpan)> {
         self.rows
             .iter()
@@ -153,8 +158,8 @@ impl TilePlan {
     }
 }
 
-/// Tiles along one side, all of the same length and within the image. So each border of a tile is either the image's border
-/// or outside the used part by the context.
+/// Tiles along one side, all of the same length and within the image. Each edge of a tile is an edge of the image, or is separated from
+/// the used part by the context. `None` if the context leaves no used part.
 fn spans(length: usize, tile: usize, context: usize, multiple: usize) -> Option<Vec<TileSpan>> {
     let tile = tile.min(length);
     let step = tile.checked_sub(2 * (context + GUARD));
@@ -203,9 +208,8 @@ pub(crate) struct Seam {
 }
 
 impl Seam {
-    /// Whether the tiles agree with the whole image: the same bytes, except at most one in a thousand that differs by one
-    /// code, because of the last bit of a float.
-    pub(crate) fn holds(self) -> bool {
+    /// True if the overlaps agree: at most one sample in a thousand differs, by one code, because of rounding.
+    pub(crate) fn agrees(self) -> bool {
         self.max_difference <= 1 && self.differing * 1000 <= self.compared
     }
 }
@@ -250,7 +254,7 @@ impl TiledImage {
         }
     }
 
-    /// The top left part, of this height and width, of the assembled image, and the comparison of its overlaps.
+    /// Top left part, of this height and width, of the assembled image, and the comparison of its overlaps.
     pub(crate) fn finish(self, [height, width]: [usize; 2]) -> (Rgb, Seam) {
         let (rgb, seam) = (self.rgb, self.seam);
         if [rgb.height(), rgb.width()] == [height, width] {
@@ -295,38 +299,34 @@ mod tests {
         }
     }
 
-    #[test]
-    fn seams_are_compared() {
-        let cut = Cutting {
+    /// Assembles an image from tiles. With `shift`, the codes depend on the tile's position, so that seams differ.
+    fn assemble(shift: usize) -> (Rgb, Seam) {
+        let geometry = TileGeometry {
             area: [37, 50],
             tile: [20, 20],
             context: 3,
             multiple: 1,
         };
-        let plan = TilePlan::new(cut).unwrap();
-        // An image tile by tile; with a shift, pixels depend on the tile's position, so that seams differ.
-        let tiled = |shift: usize| {
-            let mut canvas = TiledImage::new([37, 50]);
-            for (row, column) in plan.tiles() {
-                let pixels = (row.output_start..row.output_end)
-                    .flat_map(|y| (column.output_start..column.output_end).map(move |x| (y, x)));
-                canvas.add(
-                    row,
-                    column,
-                    &pixels
-                        .flat_map(|(y, x): (usize, usize)| {
-                            [(y * 5 + x * 3 + shift * column.input_start) as u8; 3]
-                        })
-                        .collect::<Vec<_>>(),
-                );
+        let mut canvas = TiledImage::new([37, 50]);
+        for (row, column) in TilePlan::new(geometry).unwrap().tiles() {
+            let mut bytes = Vec::new();
+            for y in row.output_start..row.output_end {
+                for x in column.output_start..column.output_end {
+                    bytes.extend([(y * 5 + x * 3 + shift * column.input_start) as u8; 3]);
+                }
             }
-            canvas.finish([37, 50])
-        };
-        let (image, seam) = tiled(0);
+            canvas.add(row, column, &bytes);
+        }
+        canvas.finish([37, 50])
+    }
+
+    #[test]
+    fn seams_are_compared() {
+        let (image, seam) = assemble(0);
         let expected = (0..37 * 50).flat_map(|i| [(i / 50 * 5 + i % 50 * 3) as u8; 3]);
         assert!(image.samples().iter().copied().eq(expected));
-        assert!(seam.holds() && seam.compared > 1000 && seam.max_difference == 0);
-        let (_, seam) = tiled(1);
-        assert!(!seam.holds() && seam.max_difference > 1, "{seam:?}");
+        assert!(seam.agrees() && seam.compared > 1000 && seam.max_difference == 0);
+        let (_, seam) = assemble(1);
+        assert!(!seam.agrees() && seam.max_difference > 1, "{seam:?}");
     }
 }

@@ -7,30 +7,38 @@ fn preset(name: &str) -> Preset {
     preset.unwrap()
 }
 
-/// Float images with these numbers of channels and any size; a single number if 0.
+/// Float ports, by name and number of channels: images of any size, or a single number for 0 channels.
 fn ports(all: &[(&str, usize)]) -> Vec<Port> {
-    let any = || Dim::Free("n".into());
     all.iter()
         .map(|(name, channels)| Port {
             name: (*name).to_owned(),
             element: ElementType::Float32,
             dims: match channels {
                 0 => vec![Dim::Known(1)],
-                channels => vec![Dim::Known(1), Dim::Known(*channels), any(), any()],
+                channels => vec![
+                    Dim::Known(1),
+                    Dim::Known(*channels),
+                    Dim::Free("n".into()),
+                    Dim::Free("n".into()),
+                ],
             },
         })
         .collect()
 }
 
-/// A preset's statements for a graph with these outputs.
+/// A preset's convention for a graph with these outputs.
 fn stated(name: &str, outputs: &[(&str, usize)]) -> std::result::Result<ModelSidecar, String> {
     let sidecar = ModelSidecar::default();
     preset(name).for_graph(&sidecar, &ports(&[("x", 3)]), &ports(outputs))
 }
 
 #[test]
-fn presets_stand_before_a_colon() {
-    for name in all().unwrap().into_keys().chain(["zero-dce-pp".to_owned()]) {
+fn preset_is_split_at_the_colon() {
+    for name in all_presets()
+        .unwrap()
+        .into_keys()
+        .chain(["zero-dce-pp".to_owned()])
+    {
         let model = format!("{name}:a/b.onnx");
         let (preset, file) = Preset::split(Path::new(&model)).unwrap();
         assert_eq!(
@@ -49,7 +57,7 @@ fn presets_stand_before_a_colon() {
 }
 
 #[test]
-fn a_file_that_is_named_after_another_preset_is_found() {
+fn file_named_like_another_preset_is_recognised() {
     for (name, file, other) in [
         ("zero-dce", "a/ruas_upe_1out.onnx", Some("ruas-upe")),
         ("enlightengan", "Zero_DCE_epoch99.onnx", Some("zero-dce")),
@@ -64,19 +72,19 @@ fn a_file_that_is_named_after_another_preset_is_found() {
         ("enlightengan", "science_mankind.onnx", None),
         ("darkir", "model.onnx", None),
     ] {
-        let found = preset(name).named_after(Path::new(file));
+        let found = preset(name).other_preset_in_name(Path::new(file));
         assert_eq!(found.as_deref(), other, "{name}:{file}");
     }
 }
 
 #[test]
-fn every_preset_is_described_and_stands_in_the_help() {
+fn every_preset_is_documented() {
     let texts = [
         include_str!("../../../../docs/enhancers.md"),
         include_str!("../../settings.rs"),
         include_str!("../../../../run/enhance/mod.rs"),
     ];
-    for (name, content) in all().unwrap() {
+    for (name, content) in all_presets().unwrap() {
         for text in texts {
             let mut words = text.split(|c: char| !(c.is_alphanumeric() || "+-".contains(c)));
             assert!(words.any(|word| word == name), "{name} is not described");
@@ -90,8 +98,8 @@ fn every_preset_is_described_and_stands_in_the_help() {
 }
 
 #[test]
-fn every_preset_has_its_source() {
-    for (name, content) in all().unwrap() {
+fn every_preset_states_its_source() {
+    for (name, content) in all_presets().unwrap() {
         assert!(
             content.commit.len() == 7
                 && content
@@ -110,7 +118,7 @@ fn every_preset_has_its_source() {
             assert!((1..=list.channels.len()).contains(&list.nth), "{name}");
             assert_eq!(list.channels[list.nth - 1], 3, "{name}");
         }
-        // The output is identified next to the names, where it can be checked against a graph.
+        // A preset identifies its output by `names`, which are checked against a graph, and not by keys of the sidecar.
         assert!(content.sidecar.output.is_none() && content.sidecar.image.is_none());
         let source = content.to_string();
         assert!(source.contains(&content.repository) && source.contains(&content.commit));
@@ -118,14 +126,14 @@ fn every_preset_has_its_source() {
 }
 
 #[test]
-fn the_image_is_found_among_the_channels_of_one_output() {
-    let image = |name, outputs| {
-        let stated = stated(name, outputs).unwrap();
-        stated.image.unwrap().to_string()
-    };
-    assert_eq!(image("agllnet", &[("a/b:0", 7)]), "`a/b:0`[4:7]");
-    let curves = image("zero-dce-tf", &[("y", 24)]);
-    assert!(curves.starts_with("curves(input, `y`[0:3]"), "{curves}");
+fn image_is_sliced_from_a_stacked_output() {
+    for (name, outputs, start) in [
+        ("agllnet", [("a/b:0", 7)], "`a/b:0`[4:7]"),
+        ("zero-dce-tf", [("y", 24)], "curves(input, `y`[0:3]"),
+    ] {
+        let image = stated(name, &outputs).unwrap().image.unwrap().to_string();
+        assert!(image.starts_with(start), "{image}");
+    }
     for (name, outputs) in [
         ("agllnet", &[("y", 3)][..]),
         ("zero-dce-tf", &[("y", 3)]),
@@ -137,9 +145,9 @@ fn the_image_is_found_among_the_channels_of_one_output() {
 }
 
 #[test]
-fn the_list_has_source_licence_and_export_of_each_preset() {
+fn list_has_source_licence_and_export_of_each_preset() {
     let list = list_of_presets().unwrap();
-    for (name, content) in all().unwrap() {
+    for (name, content) in all_presets().unwrap() {
         assert!(list.contains(&content.repository), "{name}");
         assert!(!content.licence.is_empty(), "{name}");
         let script = include_str!("../../../../../models/export.py");
@@ -152,7 +160,7 @@ fn the_list_has_source_licence_and_export_of_each_preset() {
 }
 
 #[test]
-fn the_output_is_known_by_name_then_by_channels() {
+fn output_is_chosen_by_name_then_by_channels() {
     for (name, outputs, expected) in [
         ("zero-dce", &[("a", 3), ("b", 3), ("c", 24)][..], "b"),
         ("zero-dce", &[("a", 3), ("c", 24)], "a"),
@@ -184,7 +192,7 @@ fn the_output_is_known_by_name_then_by_channels() {
 }
 
 #[test]
-fn an_unknown_list_of_outputs_is_an_error_that_lists_them() {
+fn error_about_unknown_outputs_lists_them() {
     for (name, outputs) in [
         ("zero-dce", &[("1", 3), ("2", 3)][..]),
         ("ruas-lol", &[("output", 3), ("2", 3), ("3", 3)]),
@@ -198,14 +206,14 @@ fn an_unknown_list_of_outputs_is_an_error_that_lists_them() {
             assert!(message.contains(&format!("{output:?}")), "{message}");
         }
     }
-    // A single output, or a single image, is the image under any name.
+    // A single output, or a single one with three channels, is the image whatever its name.
     for outputs in [&[("1", 3)][..], &[("curves", 24), ("2", 3)]] {
         assert_eq!(stated("retinexformer", outputs).unwrap().output, None);
     }
 }
 
 #[test]
-fn what_a_sidecar_says_of_the_image_goes_before_a_preset() {
+fn output_of_the_sidecar_overrides_the_preset() {
     let sidecar = ModelSidecar {
         output: Some(OutputChoice::Index(0)),
         ..ModelSidecar::default()
@@ -219,7 +227,7 @@ fn what_a_sidecar_says_of_the_image_goes_before_a_preset() {
 }
 
 #[test]
-fn pairlie_is_composed_or_exported_with_its_exponent() {
+fn pairlie_is_an_expression_or_takes_its_exponent_as_an_input() {
     let found = stated("pairlie", &[("L", 1), ("R", 3), ("X", 3)]).unwrap();
     assert_eq!(
         (found.image, found.output),
@@ -235,7 +243,7 @@ fn pairlie_is_composed_or_exported_with_its_exponent() {
 }
 
 #[test]
-fn uretinex_is_composed_of_reflectance_and_light() {
+fn uretinex_is_the_product_of_reflectance_and_illumination() {
     let found = stated("uretinex", &[("R", 3), ("L", 1), ("High_L", 1)]).unwrap();
     assert_eq!(
         (found.image, found.output),
@@ -244,35 +252,37 @@ fn uretinex_is_composed_of_reflectance_and_light() {
 }
 
 #[test]
-fn a_number_is_a_map_where_the_graph_takes_one() {
+fn number_becomes_a_map_where_the_graph_takes_one() {
     let outputs = ports(&[("output", 3)]);
-    let value = |name: &str, channels: usize| {
+    for (name, channels, expected) in [
+        ("uretinex", 0, "5"),
+        ("uretinex", 1, "map of 5"),
+        ("kind", 0, "5.0"),
+        ("kind", 1, "map of 5.0"),
+    ] {
         let inputs = ports(&[("x", 3), ("ratio", channels)]);
         let found = preset(name).for_graph(&ModelSidecar::default(), &inputs, &outputs);
-        found.unwrap().extra["ratio"].to_string()
-    };
-    assert_eq!(
-        [value("uretinex", 0), value("uretinex", 1)],
-        ["5", "map of 5"]
-    );
-    assert_eq!([value("kind", 0), value("kind", 1)], ["5.0", "map of 5.0"]);
+        assert_eq!(found.unwrap().extra["ratio"].to_string(), expected);
+    }
+}
+
+/// Differences between the authors' model and a graph with these inputs and outputs.
+fn differences(name: &str, inputs: &[(&str, usize)], outputs: &[(&str, usize)]) -> Option<String> {
+    preset(name).differences(&ports(inputs), &ports(outputs))
 }
 
 #[test]
-fn a_graph_that_is_not_the_authors_is_told_apart() {
-    let differing = |name: &str, inputs: &[(&str, usize)], outputs: &[(&str, usize)]| {
-        preset(name).differing(&ports(inputs), &ports(outputs))
-    };
+fn differences_from_the_authors_model_are_reported() {
     let image = [("x", 3)];
     let three = [("a", 3), ("b", 3), ("c", 24)];
-    assert_eq!(differing("zero-dce", &image, &three), None);
-    assert_eq!(differing("zero-dce", &image, &three[..1]), None);
-    let found = differing("sci", &image, &three).unwrap();
+    assert_eq!(differences("zero-dce", &image, &three), None);
+    assert_eq!(differences("zero-dce", &image, &three[..1]), None);
+    let found = differences("sci", &image, &three).unwrap();
     assert!(found.contains("outputs of 3, 3 channels"), "{found}");
-    let found = differing("sci", &[("x", 3), ("ratio", 0)], &three[..1]).unwrap();
+    let found = differences("sci", &[("x", 3), ("ratio", 0)], &three[..1]).unwrap();
     assert!(found.contains("inputs differ"), "{found}");
     assert_eq!(
-        differing("kind", &[("x", 3), ("ratio", 1)], &three[..1]),
+        differences("kind", &[("x", 3), ("ratio", 1)], &three[..1]),
         None
     );
 }

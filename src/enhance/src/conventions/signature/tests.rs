@@ -1,19 +1,21 @@
 use super::*;
 use crate::conventions::convention::ElementType;
 use crate::conventions::extra::{ExtraValue, Number};
-use crate::conventions::sidecar::OutputChoice;
+
 use crate::graphs::Dim;
 
-/// A float32 port; a dimension of 0 is a free one.
+/// A float32 port; 0 stands for a dimension of any size.
 fn port(name: &str, dims: &[usize]) -> Port {
-    let dim = |size: &usize| match size {
-        0 => Dim::Free("n".into()),
-        known => Dim::Known(*known),
-    };
     Port {
         name: name.into(),
         element: ElementType::Float32,
-        dims: dims.iter().map(dim).collect(),
+        dims: dims
+            .iter()
+            .map(|size| match size {
+                0 => Dim::Free("n".into()),
+                known => Dim::Known(*known),
+            })
+            .collect(),
     }
 }
 
@@ -29,12 +31,18 @@ fn signature(inputs: &[Port], outputs: &[Port]) -> Result<Signature, String> {
     Signature::infer(inputs, outputs, &ModelSidecar::default())
 }
 
+fn infer_with(inputs: &[Port], outputs: &[Port], sidecar: &str) -> Result<Signature, String> {
+    let sidecar = ModelSidecar::parse(std::path::Path::new("m.onnx"), sidecar).unwrap();
+    Signature::infer(inputs, outputs, &sidecar)
+}
+
+/// Name of the output that is chosen as the image.
 fn choose(outputs: &[Port]) -> Result<String, String> {
     signature(&[image("input")], outputs).map(|signature| signature.outputs[0].port.name.clone())
 }
 
 #[test]
-fn the_only_image_is_taken_whatever_its_name() {
+fn only_image_is_chosen_whatever_its_name() {
     let cases = [
         vec![image("758")],
         vec![curves("a"), image("758")],
@@ -43,12 +51,17 @@ fn the_only_image_is_taken_whatever_its_name() {
         vec![port("758", &[])],
     ];
     for outputs in cases {
-        assert_eq!(choose(&outputs), Ok("758".into()), "{}", list(&outputs));
+        assert_eq!(
+            choose(&outputs),
+            Ok("758".into()),
+            "{}",
+            format_ports(&outputs)
+        );
     }
 }
 
 #[test]
-fn among_several_the_name_decides() {
+fn name_decides_among_several_images() {
     for (names, expected) in [
         (&["illumination", "output"][..], "output"),
         (&["enhanced", "params"], "enhanced"),
@@ -61,7 +74,7 @@ fn among_several_the_name_decides() {
 }
 
 #[test]
-fn zero_dce_gives_its_second_output_under_any_name() {
+fn second_output_of_zero_dce_is_chosen_whatever_its_name() {
     for names in [
         ["enhance_image_1", "enhance_image", "r"],
         ["301", "322", "300"],
@@ -74,7 +87,7 @@ fn zero_dce_gives_its_second_output_under_any_name() {
 }
 
 #[test]
-fn an_ambiguous_output_must_be_stated() {
+fn ambiguous_output_must_be_stated() {
     for names in [
         &["1", "2"][..],
         &["output", "322"],
@@ -88,42 +101,36 @@ fn an_ambiguous_output_must_be_stated() {
         assert!(message.contains("output = INDEX"), "{message}");
         assert!(names.iter().all(|name| message.contains(name)), "{message}");
     }
-    // Names and structure that contradict each other.
+    // The name suggests the first output, Zero-DCE's structure the second.
     let outputs = [image("enhanced"), image("half"), curves("r")];
     assert!(choose(&outputs).is_err());
 }
 
 #[test]
-fn a_stated_output_is_taken_where_it_can_be_an_image() {
+fn stated_output_is_chosen_if_it_can_be_an_image() {
+    let inputs = [image("input")];
     let outputs = [image("1"), image("2"), curves("3")];
-    let stated = |outputs: &[Port], choice: OutputChoice| {
-        let sidecar = ModelSidecar {
-            output: Some(choice),
-            ..ModelSidecar::default()
-        };
-        let found = Signature::infer(&[image("input")], outputs, &sidecar);
-        found.map(|signature| signature.outputs[0].port.name.clone())
-    };
-    let index = OutputChoice::Index;
-    assert_eq!(stated(&outputs, index(0)), Ok("1".into()));
-    assert_eq!(
-        stated(&outputs, OutputChoice::Name("2".into())),
-        Ok("2".into())
-    );
-    // With a single output, any index is that one.
-    assert_eq!(stated(&outputs[1..2], index(3)), Ok("2".into()));
-    for (choice, part) in [
-        (index(3), "does not exist"),
-        (OutputChoice::Name("x".into()), "does not exist"),
-        (index(2), "is not an image"),
+    for (outputs, line, name) in [
+        (&outputs[..], "output = 0", "1"),
+        (&outputs, "output = \"2\"", "2"),
+        // The index may count the outputs of another export, so a single output is taken at any index.
+        (&outputs[1..2], "output = 3", "2"),
     ] {
-        let message = stated(&outputs, choice).unwrap_err();
+        let found = infer_with(&inputs, outputs, line).unwrap();
+        assert_eq!(found.outputs[0].port.name, name, "{line}");
+    }
+    for (line, part) in [
+        ("output = 3", "does not exist"),
+        ("output = \"x\"", "does not exist"),
+        ("output = 2", "is not an image"),
+    ] {
+        let message = infer_with(&inputs, &outputs, line).unwrap_err();
         assert!(message.contains(part), "{message}");
     }
 }
 
 #[test]
-fn fixed_sizes_are_read_and_must_agree() {
+fn fixed_sizes_of_input_and_output_must_agree() {
     let fixed = port("in", &[1, 3, 96, 128]);
     let found = signature(
         std::slice::from_ref(&fixed),
@@ -139,7 +146,7 @@ fn fixed_sizes_are_read_and_must_agree() {
 }
 
 #[test]
-fn layouts_and_elements_are_read() {
+fn layouts_are_inferred_for_each_element_type() {
     for (dims, layout) in [
         (&[1, 3, 0, 0][..], TensorLayout::Nchw),
         (&[0, 0, 0, 3], TensorLayout::Nhwc),
@@ -167,24 +174,15 @@ fn layouts_and_elements_are_read() {
 }
 
 #[test]
-fn a_layout_that_the_graph_leaves_open_must_be_stated() {
+fn undeclared_layout_must_be_stated() {
     let open = [port("x", &[0, 0, 0, 0])];
     let message = signature(&open, &[image("y")]).unwrap_err();
     assert!(message.contains("layout_in = \"nchw\""), "{message}");
-    let stated = |layout| ModelSidecar {
-        layout_in: Some(layout),
-        ..ModelSidecar::default()
-    };
-    let found = Signature::infer(&open, &[image("y")], &stated(TensorLayout::Nhwc)).unwrap();
+    let found = infer_with(&open, &[image("y")], "layout_in = \"nhwc\"").unwrap();
     assert_eq!(found.input.layout, TensorLayout::Nhwc);
-    for layout in [TensorLayout::Chw, TensorLayout::Nhwc] {
-        assert!(Signature::infer(&[image("x")], &[image("y")], &stated(layout)).is_err());
+    for wrong in ["layout_in = \"chw\"", "layout_in = \"nhwc\""] {
+        assert!(infer_with(&[image("x")], &[image("y")], wrong).is_err());
     }
-}
-
-/// A convention of these lines.
-fn sidecar(text: &str) -> ModelSidecar {
-    ModelSidecar::parse(std::path::Path::new("m.onnx"), text).unwrap()
 }
 
 fn typed(element: ElementType, port: Port) -> Port {
@@ -192,11 +190,11 @@ fn typed(element: ElementType, port: Port) -> Port {
 }
 
 #[test]
-fn further_numbers_need_values() {
+fn further_inputs_need_values() {
     let inputs = [image("x"), port("strength", &[1])];
     let message = signature(&inputs, &[image("y")]).unwrap_err();
     assert!(message.contains("`strength = NUMBER`"), "{message}");
-    // A value is proposed only where a preset knows the name.
+    // The message proposes a value if a preset states one for this name.
     let known = [image("x"), port("exposure", &[])];
     let message = signature(&known, &[image("y")]).unwrap_err();
     assert!(
@@ -206,32 +204,34 @@ fn further_numbers_need_values() {
     let switch = [image("x"), typed(ElementType::Bool, port("on", &[1]))];
     let message = signature(&switch, &[image("y")]).unwrap_err();
     assert!(message.contains("`on = true` or `on = false`"), "{message}");
-    let given = |text: &str| Signature::infer(&inputs, &[image("y")], &sidecar(text));
-    let found = given("[extra]\nstrength = 0.25").unwrap();
+    let found = infer_with(&inputs, &[image("y")], "[extra]\nstrength = 0.25").unwrap();
     assert_eq!(
         found.extras[0].value,
         ExtraValue::Number(Number::Float(0.25))
     );
-    let message = given("[extra]\ngamma = 1").unwrap_err();
-    assert!(message.contains("its value is unknown"), "{message}");
-    let message = given("[extra]\nstrength = 1\ngamma = 1").unwrap_err();
-    assert!(
-        message.contains("\"gamma\" under [extra], which is not an input"),
-        "{message}"
-    );
+    for (text, part) in [
+        ("[extra]\ngamma = 1", "its value is unknown"),
+        (
+            "[extra]\nstrength = 1\ngamma = 1",
+            "\"gamma\" under [extra], which is not an input",
+        ),
+    ] {
+        let message = infer_with(&inputs, &[image("y")], text).unwrap_err();
+        assert!(message.contains(part), "{message}");
+    }
 }
 
 #[test]
-fn further_inputs_take_what_fits_them() {
-    let small = |port| typed(ElementType::Int32, port);
-    let plane = || port("a", &[1, 1, 0, 0]);
+fn values_must_fit_further_inputs() {
+    let plane = port("a", &[1, 1, 0, 0]);
+    let plane_int32 = typed(ElementType::Int32, plane.clone());
     let noise = "{ noise = \"normal\" }";
     let rows = [
-        (small(port("a", &[1])), "3", None),
-        (small(port("a", &[])), "3", None),
-        (small(port("a", &[0])), "3", None),
+        (typed(ElementType::Int32, port("a", &[1])), "3", None),
+        (typed(ElementType::Int32, port("a", &[])), "3", None),
+        (typed(ElementType::Int32, port("a", &[0])), "3", None),
         (
-            small(port("a", &[1])),
+            typed(ElementType::Int32, port("a", &[1])),
             "3.5",
             Some("3.5 does not fit its type int32"),
         ),
@@ -245,19 +245,15 @@ fn further_inputs_take_what_fits_them() {
             "{ map = 1 }",
             Some("single number: `a = NUMBER`"),
         ),
-        (plane(), "0.5", Some("`a = { map = 0.5 }`")),
-        (plane(), "{ map = 0.5 }", None),
+        (plane.clone(), "0.5", Some("`a = { map = 0.5 }`")),
+        (plane.clone(), "{ map = 0.5 }", None),
         (port("a", &[1, 7, 0, 0]), "{ map = 0.5 }", None),
         (port("a", &[0, 0]), "{ map = 0.5 }", None),
-        (small(plane()), "{ map = 0.5 }", Some("type int32")),
+        (plane_int32.clone(), "{ map = 0.5 }", Some("type int32")),
         (port("a", &[1, 4, 0, 0]), noise, None),
-        (small(plane()), noise, Some("export it as float32")),
-        (plane(), "{ from = \"max(image)\" }", None),
-        (
-            plane(),
-            "{ from = \"1 - image\" }",
-            Some("mean(…) or max(…)"),
-        ),
+        (plane_int32, noise, Some("export it as float32")),
+        (plane.clone(), "{ from = \"max(image)\" }", None),
+        (plane, "{ from = \"1 - image\" }", Some("mean(…) or max(…)")),
         (port("a", &[1, 3, 0, 0]), "{ from = \"1 - image\" }", None),
         (
             port("a", &[1, 4, 0, 0]),
@@ -272,8 +268,8 @@ fn further_inputs_take_what_fits_them() {
     ];
     for (further, value, problem) in rows {
         let inputs = [image("x"), further];
-        let convention = sidecar(&format!("[extra]\na = {value}"));
-        let found = Signature::infer(&inputs, &[image("y")], &convention).err();
+        let text = format!("[extra]\na = {value}");
+        let found = infer_with(&inputs, &[image("y")], &text).err();
         let words = format!("{} {value}: {found:?}", inputs[1]);
         match problem {
             None => assert_eq!(found, None, "{words}"),
@@ -283,7 +279,7 @@ fn further_inputs_take_what_fits_them() {
 }
 
 #[test]
-fn what_a_further_input_may_be_is_told_by_its_shape_and_name() {
+fn shape_and_name_decide_the_proposed_value_of_a_further_input() {
     for (further, part) in [
         (port("ratio", &[1, 1, 0, 0]), "`ratio = { map = 5.0 }`"),
         (
@@ -306,49 +302,54 @@ fn what_a_further_input_may_be_is_told_by_its_shape_and_name() {
         assert!(message.contains(&name), "{message}");
         assert!(message.contains(part), "{message}");
     }
-    // An input of such a name is not the image, even if it is the first.
+    // An input named like a mask is not the image, even if it is the first.
     let message = signature(&[image("mask"), image("x")], &[image("y")]).unwrap_err();
     assert!(message.starts_with("takes \"mask\""), "{message}");
 }
 
 #[test]
-fn an_expression_of_the_image_names_outputs() {
+fn expression_of_the_image_names_outputs() {
+    let inputs = [image("x")];
     let outputs = [port("L", &[1, 1, 0, 0]), image("R"), curves("c")];
-    let read = |text: &str| {
-        let convention = sidecar(&format!("image = \"{text}\""));
-        let found = Signature::infer(&[image("x")], &outputs, &convention)?;
-        let names = found.outputs.into_iter().map(|output| output.port.name);
-        Ok::<_, String>(names.collect::<Vec<_>>())
-    };
-    assert_eq!(read("L ^ 0.2 * R"), Ok(vec!["L".into(), "R".into()]));
-    assert_eq!(read("R + 0 * input"), Ok(vec!["R".into()]));
-    for (text, part) in [
-        ("L * Q", "names `Q`, which is unknown"),
-        ("c * R", "not an image of one or three channels"),
-        ("input * 2", "names none of its outputs"),
+    for (line, expected) in [
+        ("image = \"L ^ 0.2 * R\"", &["L", "R"][..]),
+        ("image = \"R + 0 * input\"", &["R"]),
     ] {
-        let message = read(text).unwrap_err();
+        let found = infer_with(&inputs, &outputs, line).unwrap();
+        let names: Vec<&str> = found
+            .outputs
+            .iter()
+            .map(|output| output.port.name.as_str())
+            .collect();
+        assert_eq!(names, expected, "{line}");
+    }
+    for (line, part) in [
+        ("image = \"L * Q\"", "names `Q`, which is unknown"),
+        ("image = \"c * R\"", "not an image of one or three channels"),
+        ("image = \"input * 2\"", "names none of its outputs"),
+    ] {
+        let message = infer_with(&inputs, &outputs, line).unwrap_err();
         assert!(message.contains(part), "{message}");
     }
 }
 
 #[test]
-fn one_channel_must_be_stated_to_be_the_luma() {
+fn single_channel_must_be_stated_to_be_the_luma() {
     let inputs = [port("a", &[1, 1, 0, 0])];
     let outputs = [port("b", &[1, 1, 0, 0])];
     let message = signature(&inputs, &outputs).unwrap_err();
     assert!(message.contains("`channels = \"y\"`"), "{message}");
-    let stated = |text: &str| Signature::infer(&inputs, &outputs, &sidecar(text));
-    let found = stated("channels = \"y\"").unwrap();
+    let found = infer_with(&inputs, &outputs, "channels = \"y\"").unwrap();
     assert_eq!(found.input.layout, TensorLayout::Nchw);
-    let message = stated("channels = \"y\"\nmean = [0, 0, 1]").unwrap_err();
+    let different = "channels = \"y\"\nmean = [0, 0, 1]";
+    let message = infer_with(&inputs, &outputs, different).unwrap_err();
     assert!(message.contains("has different numbers"), "{message}");
-    let colour = Signature::infer(&[image("a")], &outputs, &sidecar("channels = \"y\""));
+    let colour = infer_with(&[image("a")], &outputs, "channels = \"y\"");
     assert!(colour.unwrap_err().contains("delete that line"));
 }
 
 #[test]
-fn other_conventions_are_refused_by_name() {
+fn unsupported_inputs_are_named() {
     let double = typed(ElementType::Float64, image("double"));
     let cases = [
         (
@@ -373,7 +374,7 @@ fn other_conventions_are_refused_by_name() {
 }
 
 #[test]
-fn a_model_without_an_image_is_refused() {
+fn model_without_an_image_output_is_refused() {
     let outputs = [port("758", &[1, 85, 22, 22]), port("flat", &[1, 3])];
     let message = choose(&outputs).unwrap_err();
     assert!(

@@ -1,10 +1,10 @@
-//! Tests of the check, on libraries of a few hundred bytes.
+//! Tests with libraries of a few hundred bytes.
 
 use std::io::Cursor;
 
 use super::*;
 
-/// Bytes of `size` zeros, with values written at positions.
+/// `size` zero bytes, overwritten by `parts` at their positions.
 fn file(size: usize, parts: &[(usize, &[u8])]) -> Vec<u8> {
     let mut bytes = vec![0; size];
     for (at, part) in parts {
@@ -17,7 +17,7 @@ fn check(format: LibraryFormat, bytes: &[u8]) -> Result<(), String> {
     format.check_content(&mut Cursor::new(bytes), bytes.len() as u64, "x86_64")
 }
 
-/// An ELF library: a segment up to byte 300, names at 200, two sections from 320 to 448.
+/// An ELF library with a segment up to byte 300, names at 200, and a table of two sections from 320 to 448.
 fn elf(names: &[u8]) -> Vec<u8> {
     let length = (names.len() as u64).to_le_bytes();
     file(
@@ -71,7 +71,7 @@ fn pe() -> Vec<u8> {
 }
 
 #[test]
-fn whole_libraries_pass_and_every_cut_is_seen() {
+fn complete_libraries_pass_and_truncated_ones_are_refused() {
     let universal = [
         file(
             64,
@@ -120,7 +120,7 @@ fn other_files_and_processors_are_refused() {
         let checked = format.check_content(&mut Cursor::new(&library), size, "aarch64");
         assert!(checked.unwrap_err().contains("another processor"));
     }
-    // A program instead of a library: ET_EXEC.
+    // ET_EXEC: a program instead of a library.
     let mut program = elf(ENTRY);
     program[16] = 2;
     assert!(check(LibraryFormat::Elf, &program).is_err());
@@ -129,7 +129,7 @@ fn other_files_and_processors_are_refused() {
 }
 
 #[test]
-fn sizes_beyond_every_file_are_no_panic() {
+fn huge_offsets_cause_no_panic() {
     for at in [32, 40, 64 + 8, 64 + 32] {
         let mut library = elf(ENTRY);
         library[at..at + 8].copy_from_slice(&u64::MAX.to_le_bytes());

@@ -1,4 +1,4 @@
-//! Conclusion of an examination ([`Found`]): the proposed lines of a sidecar, with the reason.
+//! Conclusion of an examination: proposed lines of a sidecar ([`Proposal`]).
 
 use crate::conventions::ChannelOrder;
 use crate::probes::probe::{Conclusion, Probe};
@@ -10,28 +10,28 @@ use darkqa_ground::types::Flaw;
 pub enum Settled {
     /// Exactly one convention is plausible.
     Yes,
-    /// Several are, or none is.
+    /// No or several conventions are plausible.
     No,
 }
 
-/// A line of a sidecar.
+/// A proposed line of a sidecar.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ProposedLine {
-    /// The line, as `range_in = "0..1"`.
+    /// The line, such as `range_in = "0..1"`.
     pub line: String,
-    /// Why it is proposed.
+    /// Reason for the proposal.
     pub reason: String,
 }
 
-/// Findings of an examination.
-pub(super) struct Found {
+/// Conclusion of an examination, with proposed lines.
+pub(super) struct Proposal {
     pub(super) lines: Vec<ProposedLine>,
     pub(super) conclusion: String,
     pub(super) settled: Settled,
 }
 
-impl Found {
-    fn nothing(conclusion: String) -> Self {
+impl Proposal {
+    fn without_lines(conclusion: String) -> Self {
         Self {
             lines: Vec::new(),
             conclusion,
@@ -39,25 +39,25 @@ impl Found {
         }
     }
 
-    /// The ranges that are stated are plausible.
-    pub(super) fn stated(pair: RangePair) -> Self {
+    /// No lines, because the stated ranges are plausible.
+    pub(super) fn for_stated(pair: RangePair) -> Self {
         let conclusion = format!(
             "With {pair}, as set by MODEL.onnx.toml, the preset or the element types, its images are plausible."
         );
         Self {
             settled: Settled::Yes,
-            ..Self::nothing(conclusion)
+            ..Self::without_lines(conclusion)
         }
     }
 
-    /// Several outputs could be the image: that which is read, and the plausible others.
-    pub(super) fn no_output(first: &str, probe: &Probe, others: &[String]) -> Self {
+    /// No lines, because several outputs could be the image: `first`, which is read, and `others`, which are plausible.
+    pub(super) fn for_unknown_output(first: &str, probe: &Probe, others: &[String]) -> Self {
         let mut plausible: Vec<&str> = Vec::new();
         if !probe.plausible().is_empty() {
             plausible.push(first);
         }
         plausible.extend(others.iter().map(String::as_str));
-        Self::nothing(format!(
+        Self::without_lines(format!(
             "It is unknown which output is the image; plausible: {}. Choose one in MODEL.onnx.toml next to it, `output = \"NAME\"`, or name its preset (PRESET:FILE).",
             if plausible.is_empty() {
                 "none".to_owned()
@@ -67,15 +67,16 @@ impl Found {
         ))
     }
 
-    /// Names the other outputs whose images could be enhanced ones.
-    pub(super) fn mention(&mut self, others: &[String]) {
+    /// Adds to the conclusion that other outputs give plausible images, too.
+    pub(super) fn mention_outputs(&mut self, others: &[String]) {
         for output in others {
             let found = " gives plausible images, too; check which one the model's code uses.";
             self.conclusion += &[" The ", output, found].concat();
         }
     }
 
-    fn ranges(pair: RangePair, conclusion: String) -> Self {
+    /// Lines that state a pair of ranges.
+    fn for_ranges(pair: RangePair, conclusion: String) -> Self {
         let reason = "with these value ranges its images are plausible";
         let lines = pair.lines().into_iter().map(|line| ProposedLine {
             line,
@@ -89,15 +90,15 @@ impl Found {
     }
 }
 
-/// Conclusion from the pairs of ranges: the only plausible one is proposed. `swapped` is the probe with the output's colours in the other
-/// order; it counts if the colours are the reason that nothing else is plausible. If several of its pairs are plausible, the `stated` one
-/// is taken.
+/// Proposes the only plausible pair of ranges. `swapped` is the probe with the output in the other channel order, `order`. It is used if no
+/// pair is plausible in the present order and swapped colours are the flaw; if several of its pairs are plausible, the `stated` one is
+/// proposed.
 pub(super) fn propose(
     probe: &Probe,
     stated: Option<RangePair>,
     swapped: &Probe,
     order: ChannelOrder,
-) -> Found {
+) -> Proposal {
     match probe.plausible().as_slice() {
         several @ [_, _, ..] if stated.is_none() && probe.conclusion() == Conclusion::Assumed => {
             let others: Vec<String> = several
@@ -105,7 +106,7 @@ pub(super) fn propose(
                 .filter(|pair| **pair != probe.usual)
                 .map(ToString::to_string)
                 .collect();
-            return Found::nothing(format!(
+            return Proposal::without_lines(format!(
                 "With {} its images are plausible; a run assumes these usual ranges and warns. They are with {}, too; compare the page with the model's own examples.",
                 probe.usual,
                 others.join("; ")
@@ -117,7 +118,7 @@ pub(super) fn propose(
             });
             let conclusion =
                 format!("With {pair}, and with no other ranges, its images are plausible.{stated}");
-            return Found::ranges(*pair, conclusion);
+            return Proposal::for_ranges(*pair, conclusion);
         }
         [] => {}
         several => {
@@ -127,20 +128,22 @@ pub(super) fn propose(
                     "With {pair} its images are plausible, and black and white change least. Other plausible ranges: {}.",
                     list[1..].join("; ")
                 );
-                return Found::ranges(pair, conclusion);
+                return Proposal::for_ranges(pair, conclusion);
             }
             let stated = stated.map_or_else(String::new, |pair| {
                 format!(" {pair}, as set, is not one of them.")
             });
-            return Found::nothing(format!(
+            return Proposal::without_lines(format!(
                 "Its images are plausible with several value ranges: {}.{stated} Compare the page with the model's own examples, and set the ranges of its code.",
                 list.join("; ")
             ));
         }
     }
     let is_hue = probe.pairs.iter().any(|pair| {
-        let seen = pair.verdict();
-        pair.ranges == probe.usual && seen.is_some_and(|seen| seen.example.flaw == Flaw::Hue)
+        pair.ranges == probe.usual
+            && pair
+                .verdict()
+                .is_some_and(|verdict| verdict.example.flaw == Flaw::Hue)
     });
     let plausible = swapped.plausible();
     let pair = match &plausible[..] {
@@ -152,7 +155,7 @@ pub(super) fn propose(
         let conclusion = format!(
             "With {pair} and {order} in the output its images are plausible; or with it in the input: `color = \"{order_of_input}\"` and the other order for `color_out`."
         );
-        let mut found = Found::ranges(pair, conclusion);
+        let mut found = Proposal::for_ranges(pair, conclusion);
         if stated == Some(pair) {
             found.lines.clear();
         }
@@ -162,7 +165,7 @@ pub(super) fn propose(
         });
         return found;
     }
-    Found::nothing(
+    Proposal::without_lines(
         "No value range or colour order gives plausible images. Perhaps another output is the image, the dimensions have another order, or the export has lost its weights.".to_owned(),
     )
 }

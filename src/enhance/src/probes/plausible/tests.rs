@@ -1,7 +1,7 @@
 use super::*;
 
 /// A dark image with structure and colour, in codes: squares of different light on a ramp, most of them warm, some blue.
-fn dark() -> Codes {
+fn dark() -> UnclampedImage {
     let (height, width) = (96_u32, 144_u32);
     let pixels = (0..height).flat_map(|y| {
         (0..width).map(move |x| {
@@ -13,26 +13,26 @@ fn dark() -> Codes {
             }
         })
     });
-    Codes {
+    UnclampedImage {
         height: height as usize,
         width: width as usize,
         samples: pixels.flatten().map(f32::round).collect(),
     }
 }
 
-fn each(codes: &Codes, change: impl Fn(f32) -> f32) -> Codes {
-    Codes {
+fn each(codes: &UnclampedImage, change: impl Fn(f32) -> f32) -> UnclampedImage {
+    UnclampedImage {
         samples: codes.samples.iter().map(|code| change(*code)).collect(),
         ..codes.clone()
     }
 }
 
 /// Output of a good enhancer: four times the light.
-fn good() -> Codes {
+fn good() -> UnclampedImage {
     each(&dark(), |code| 4.0 * code)
 }
 
-fn flaw(made: &Codes) -> Option<Flaw> {
+fn flaw(made: &UnclampedImage) -> Option<Flaw> {
     judge(&dark(), made).map(|verdict| verdict.flaw)
 }
 
@@ -54,7 +54,7 @@ fn an_enhanced_image_has_no_flaw() {
 }
 
 #[test]
-fn each_wrong_reading_has_its_flaw() {
+fn each_wrong_decoding_has_its_flaw() {
     let good = good();
     let swapped = {
         let mut made = good.clone();
@@ -63,10 +63,9 @@ fn each_wrong_reading_has_its_flaw() {
             .for_each(|pixel| pixel.swap(0, 2));
         made
     };
-    let relabelled = {
-        // Planes read as packed pixels.
+    let planes_as_pixels = {
         let planes = (0..3).flat_map(|channel| good.samples.iter().skip(channel).step_by(3));
-        Codes {
+        UnclampedImage {
             samples: planes.copied().collect(),
             ..good.clone()
         }
@@ -88,7 +87,7 @@ fn each_wrong_reading_has_its_flaw() {
             Flaw::White,
         ),
         (each(&good, |code| 255.0 - code), Flaw::Inverted),
-        (relabelled, Flaw::Shuffled),
+        (planes_as_pixels, Flaw::Shuffled),
         (swapped, Flaw::Hue),
         (grey, Flaw::Grey),
         (each(&good, |code| f32::midpoint(code, 255.0)), Flaw::Haze),
@@ -106,27 +105,24 @@ fn a_pale_room_is_no_haze() {
     assert_eq!(judge(&pale, &made), None);
     let hazy = each(&good(), |code| f32::midpoint(code, 255.0));
     assert_eq!(judge(&dark(), &hazy).unwrap().flaw, Flaw::Haze);
-    // The rule looks at the dark frame: a dark one that comes out pale is a haze.
+    // The rule compares with the dark frame: a pale output of a frame with dark pixels is a haze.
     assert_eq!(judge(&dark(), &made).unwrap().flaw, Flaw::Haze);
 }
 
 #[test]
-fn a_black_output_is_impossible_and_a_denoised_one_doubtful() {
-    let gravity = |made: &Codes| judge(&dark(), made).unwrap().gravity;
-    assert_eq!(
-        gravity(&each(&dark(), |code| 0.4 * code)),
-        Gravity::Impossible
-    );
-    assert_eq!(
-        gravity(&each(&dark(), |code| code + 1.0)),
-        Gravity::Doubtful
-    );
+fn black_output_is_impossible_and_unlit_output_doubtful() {
+    for (output, gravity) in [
+        (each(&dark(), |code| 0.4 * code), Gravity::Impossible),
+        (each(&dark(), |code| code + 1.0), Gravity::Doubtful),
+    ] {
+        assert_eq!(judge(&dark(), &output).unwrap().gravity, gravity);
+    }
 }
 
 #[test]
 fn images_smaller_than_a_block_are_judged_too() {
     for (height, width) in [(1, 1), (3, 200), (200, 3), (4, 4)] {
-        let image = Codes {
+        let image = UnclampedImage {
             height,
             width,
             samples: vec![3.0; height * width * 3],
@@ -136,7 +132,7 @@ fn images_smaller_than_a_block_are_judged_too() {
         for (place, sample) in made.samples.iter_mut().enumerate() {
             *sample = 20.0 + (place % 5) as f32 * 10.0;
         }
-        // No figure may be lost in a division by zero.
+        // No figure may be a division by zero.
         if let Some(verdict) = judge(&image, &made) {
             assert!(verdict.figure.is_finite());
         }

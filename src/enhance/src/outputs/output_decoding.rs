@@ -1,6 +1,6 @@
-//! Conversion of a model's output tensor to an image of bytes: [`OutputReading`].
+//! Conversion of a model's output tensor to an image: [`OutputDecoding`].
 //!
-//! One pass checks the values, another clamps and rounds them.
+//! A first pass checks the values, a second one clamps and rounds them.
 
 use std::borrow::Cow;
 
@@ -17,20 +17,20 @@ use crate::sizing::TileWindow;
 
 /// Conversion of an output tensor to an image.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct OutputReading {
-    /// Order of the dimensions; `None` if only a run shows it.
+pub(crate) struct OutputDecoding {
+    /// Order of the dimensions; `None` if it is known only after a run.
     pub(crate) layout: Option<TensorLayout>,
-    /// Layout that is chosen if several fit: that of the input.
+    /// Layout of the input, preferred if several fit.
     pub(crate) preferred: TensorLayout,
-    /// Numbers of channels that it may have, the likely one first.
+    /// Possible numbers of channels, the most likely one first.
     pub(super) channels: Vec<usize>,
-    /// The channels that are read; `None` for all.
+    /// Channels that are used; `None` for all.
     pub(super) slice: Option<ChannelSlice>,
     pub(crate) color: ChannelOrder,
     pub(crate) range: ValueRange,
-    /// Added to each channel after it was multiplied by the second; `None` for neither.
+    /// Means and standard deviations: each channel is multiplied by its deviation, then its mean is added. `None` for neither.
     pub(crate) mean_and_std: Option<[[f32; 3]; 2]>,
-    /// Whether the range is known or must be checked against the values.
+    /// Whether `range` is known or must be checked against the values.
     pub(super) certainty: Certainty,
     pub(super) rounding: Rounding,
 }
@@ -38,21 +38,21 @@ pub(crate) struct OutputReading {
 /// Whether the range of an output is known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Certainty {
-    /// A sidecar, a preset or the type states it.
+    /// Stated by a sidecar or preset, or implied by the element type.
     Known,
-    /// It is the input's or the usual range.
+    /// Assumed to be the range of the input.
     Assumed,
 }
 
-/// Problem with the values of an output, or of an input.
+/// Problem with the values of an input or output.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum OutOfRange {
-    /// Some values are not numbers (NaN).
-    NotNumbers,
-    /// The expressions in the sidecar make values that are not finite of the image, which are not fed.
-    NotFed,
-    /// The values have another range than the assumed one.
-    Beyond {
+pub(crate) enum InvalidValues {
+    /// The output contains NaN.
+    NanOutput,
+    /// The expressions for inputs in the sidecar give values that are not finite.
+    NonFiniteInput,
+    /// The output has another range than the assumed one.
+    OutOfRange {
         min: f32,
         max: f32,
         /// Range that the values seem to have.
@@ -85,8 +85,8 @@ impl<'a> TensorSamples<'a> {
     }
 }
 
-impl OutputReading {
-    /// The conversion that an output, the input and the convention define.
+impl OutputDecoding {
+    /// The decoding defined by an output, the image input and the convention.
     pub(super) fn new(output: &Output, input: &ImageInput, convention: &ModelSidecar) -> Self {
         let mean_and_std = convention.mean_and_std_out();
         let (range, certainty) = match (convention.range_out, &output.port.element) {
@@ -95,7 +95,7 @@ impl OutputReading {
             (None, ElementType::Uint8 | ElementType::Int32 | ElementType::Int64) => {
                 (ValueRange::Bytes, Certainty::Known)
             }
-            // Without a statement, the output has the range of the input.
+            // An unstated range is assumed to be that of the input.
             (None, _) => (
                 convention
                     .range_in
@@ -119,16 +119,8 @@ impl OutputReading {
         }
     }
 
-    /// Layout and number of channels of an output with dimensions `dims` for an image of this size; `None` if it cannot be one.
+    /// Layout and number of channels of an output with dimensions `dims`; `None` if it is not an image of this size.
     pub(super) fn layout(&self, dims: &[i64], size: [usize; 2]) -> Option<(TensorLayout, usize)> {
-        let fits = |layout: TensorLayout, channels: usize| {
-            let wanted = layout.dims(size, channels);
-            wanted.len() == dims.len()
-                && wanted
-                    .iter()
-                    .zip(dims)
-                    .all(|(a, b)| usize::try_from(*b) == Ok(*a))
-        };
         let layouts: Vec<TensorLayout> = match self.layout {
             Some(layout) => vec![layout],
             None => std::iter::once(self.preferred)
@@ -138,78 +130,86 @@ impl OutputReading {
         self.channels
             .iter()
             .flat_map(|count| layouts.iter().map(move |layout| (*layout, *count)))
-            .find(|(layout, count)| fits(*layout, *count))
+            .find(|(layout, count)| {
+                let expected = layout.dims(size, *count);
+                expected.len() == dims.len()
+                    && expected
+                        .iter()
+                        .zip(dims)
+                        .all(|(a, b)| usize::try_from(*b) == Ok(*a))
+            })
     }
 
-    /// The bytes of a part of an output of three channels, as red, green and blue of each pixel; `size` is that of the whole output.
+    /// Decodes a part of an output of three channels to packed RGB bytes; `size` is the size of the whole output.
     pub(super) fn bytes(
         &self,
         samples: TensorSamples<'_>,
         layout: TensorLayout,
         size: [usize; 2],
         part: TileWindow,
-    ) -> Result<Vec<u8>, OutOfRange> {
+    ) -> Result<Vec<u8>, InvalidValues> {
         if let TensorSamples::Uint8(bytes) = samples {
-            return Ok(self.gather(bytes, layout, size, part, |byte| byte));
+            return Ok(self.gather_bytes(bytes, layout, size, part, |byte| byte));
         }
         let values = samples.floats();
-        check(&values, self.range, self.certainty)?;
+        check_values(&values, self.range, self.certainty)?;
         let (range, rounding) = (self.range, self.rounding);
-        Ok(self.gather(&values, layout, size, part, |value| {
-            let code = range.code(value).clamp(0.0, 255.0);
+        Ok(self.gather_bytes(&values, layout, size, part, |value| {
+            let code = range.to_code(value).clamp(0.0, 255.0);
             match rounding {
-                Rounding::Round => nearest(code),
+                Rounding::Round => round_to_u8(code),
                 Rounding::Truncate => code as u8,
             }
         }))
     }
 
-    /// A part of an output as floats in 0..1; `size` is that of the whole output. Of the values nothing is checked but `certainty`.
+    /// Decodes a part of an output to planes in 0..1. The output has `all_channels` channels, and `size` is its whole size. `certainty`
+    /// overrides that of the decoding.
     pub(super) fn planes(
         &self,
         samples: TensorSamples<'_>,
-        (layout, channels): (TensorLayout, usize),
+        layout: TensorLayout,
+        all_channels: usize,
         [height, width]: [usize; 2],
         part: TileWindow,
         certainty: Certainty,
-    ) -> Result<Planes, OutOfRange> {
+    ) -> Result<Planes, InvalidValues> {
         let values = samples.floats();
-        // Other channels than those that are read may have any values.
+        // Unused channels may have any values.
         if self.slice.is_none() {
-            check(&values, self.range, certainty)?;
+            check_values(&values, self.range, certainty)?;
         }
-        let all = channels;
-        let (first, channels) = self
-            .slice
-            .map_or((0, all), |slice| (slice.first, slice.count()));
-        let at = |channel: usize, row: usize, column: usize| {
-            let pixel = row * width + column;
+        let (first, channels) = match self.slice {
+            None => (0, all_channels),
+            Some(slice) => (slice.first, slice.count()),
+        };
+        let mut samples = Vec::with_capacity(channels * part.size()[0] * part.size()[1]);
+        for channel in 0..channels {
             let channel = match channels {
                 3 => self.color.rgb_channel(channel),
                 _ => channel,
             };
-            let place = first + channel;
-            let mut value = if layout.is_planar() {
-                values[place * height * width + pixel]
-            } else {
-                values[all * pixel + place]
-            };
-            if let (Some([mean, std]), 3) = (self.mean_and_std, channels) {
-                value = value * std[channel] + mean[channel];
-            }
-            match self.range {
-                ValueRange::Unit => value,
-                ValueRange::Bytes | ValueRange::Signed => self.range.code(value) / 255.0,
-            }
-        };
-        let mut samples = Vec::with_capacity(channels * part.size()[0] * part.size()[1]);
-        for channel in 0..channels {
+            let source = first + channel;
             for row in part.top..part.bottom {
-                samples.extend((part.left..part.right).map(|column| at(channel, row, column)));
+                samples.extend((part.left..part.right).map(|column| {
+                    let pixel = row * width + column;
+                    let mut value = if layout.is_planar() {
+                        values[source * height * width + pixel]
+                    } else {
+                        values[all_channels * pixel + source]
+                    };
+                    if let (Some([mean, std]), 3) = (self.mean_and_std, channels) {
+                        value = value * std[channel] + mean[channel];
+                    }
+                    match self.range {
+                        ValueRange::Unit => value,
+                        ValueRange::Bytes | ValueRange::Signed => self.range.to_code(value) / 255.0,
+                    }
+                }));
             }
         }
         if samples.iter().any(|sample| sample.is_nan()) {
-            return Err(OutOfRange::NotNumbers);
+            return Err(InvalidValues::NanOutput);
         }
         Ok(Planes {
             height: part.size()[0],
@@ -218,7 +218,8 @@ impl OutputReading {
         })
     }
 
-    fn gather<T: Copy>(
+    /// Packed RGB bytes of a part of an output, each computed from its sample by `byte`.
+    fn gather_bytes<T: Copy>(
         &self,
         samples: &[T],
         layout: TensorLayout,
@@ -250,15 +251,15 @@ impl OutputReading {
     }
 }
 
-/// Refuses values that are not numbers, and values that do not fit the assumed range.
+/// Refuses NaN, and values that do not fit the assumed range.
 ///
-/// Models that do not clamp overshoot by a little. So the range counts as wrong only if more than one sample in 20 is far
+/// Models that do not clamp their output overshoot a little. So the range counts as wrong only if more than one sample in 20 is far
 /// outside.
-pub(super) fn check(
+pub(super) fn check_values(
     values: &[f32],
     range: ValueRange,
     certainty: Certainty,
-) -> Result<(), OutOfRange> {
+) -> Result<(), InvalidValues> {
     let (mut nans, mut below, mut above) = (0_usize, 0_usize, 0_usize);
     let mut max = f32::NEG_INFINITY;
     for value in values {
@@ -268,7 +269,7 @@ pub(super) fn check(
         above += usize::from(*value > 8.0);
     }
     if nans > 0 {
-        return Err(OutOfRange::NotNumbers);
+        return Err(InvalidValues::NanOutput);
     }
     let tolerated = values.len() / 20;
     let likely = match (certainty, range) {
@@ -277,15 +278,15 @@ pub(super) fn check(
         (Certainty::Assumed, ValueRange::Bytes) if max <= 1.5 => ValueRange::Unit,
         _ => return Ok(()),
     };
-    Err(OutOfRange::Beyond {
+    Err(InvalidValues::OutOfRange {
         min: values.iter().copied().fold(f32::INFINITY, f32::min),
         max,
         likely,
     })
 }
 
-/// The code nearest to a value of 0..255; halves are rounded away from zero.
-pub(crate) fn nearest(code: f32) -> u8 {
+/// Nearest code to a value in 0..255; halves are rounded up.
+pub(crate) fn round_to_u8(code: f32) -> u8 {
     let below = code as u8;
     below + u8::from(code - f32::from(below) >= 0.5)
 }

@@ -1,9 +1,9 @@
 use super::*;
 use crate::conventions::{Channels, Padding};
-use crate::inputs::{DarkImage, FedImage, Feeding, Tensor, TensorData};
+use crate::inputs::{DarkImage, FedImage, InputEncoding, Tensor, TensorData};
 use darkqa_ground::types::Rgb;
 
-const FEEDING: Feeding = Feeding {
+const ENCODING: InputEncoding = InputEncoding {
     layout: TensorLayout::Nchw,
     element: ElementType::Float32,
     channels: Channels::Rgb,
@@ -14,8 +14,8 @@ const FEEDING: Feeding = Feeding {
     std: [1.0; 3],
     pad: Padding::Reflect,
 };
-fn reading() -> OutputReading {
-    OutputReading {
+fn decoding() -> OutputDecoding {
+    OutputDecoding {
         layout: None,
         preferred: TensorLayout::Nchw,
         channels: vec![3],
@@ -46,15 +46,15 @@ fn near(a: &TensorData, b: &TensorData) -> bool {
     }
 }
 
-/// The tensor of a window of an image.
-fn fed(feeding: &Feeding, image: &Rgb, window: TileWindow) -> Tensor {
+/// Encodes a window of an image.
+fn encode(encoding: &InputEncoding, image: &Rgb, window: TileWindow) -> Tensor {
     let dark = DarkImage::new(image);
     let fed = FedImage::Window {
         dark: &dark,
         window,
-        pad: feeding.pad,
+        pad: encoding.pad,
     };
-    feeding.tensor(&fed).unwrap()
+    encoding.tensor(&fed).unwrap()
 }
 
 fn floats(input: &Tensor) -> &[f32] {
@@ -65,7 +65,7 @@ fn floats(input: &Tensor) -> &[f32] {
 }
 
 #[test]
-fn every_convention_gives_every_byte_back() {
+fn decoding_inverts_encoding_in_every_convention() {
     let image = image(11, 24);
     for layout in TensorLayout::ALL {
         for (element, range) in [
@@ -76,19 +76,19 @@ fn every_convention_gives_every_byte_back() {
             (ElementType::Uint8, ValueRange::Bytes),
         ] {
             for color in [ChannelOrder::Rgb, ChannelOrder::Bgr] {
-                let feeding = Feeding {
+                let encoding = InputEncoding {
                     layout,
                     element: element.clone(),
                     color,
                     range,
-                    ..FEEDING
+                    ..ENCODING
                 };
-                let input = fed(&feeding, &image, whole(&image));
-                let reading = OutputReading {
+                let input = encode(&encoding, &image, whole(&image));
+                let decoding = OutputDecoding {
                     preferred: layout,
                     color,
                     range,
-                    ..reading()
+                    ..decoding()
                 };
                 let samples = match &input.data {
                     TensorData::Float32(values) => TensorSamples::Float32(values),
@@ -101,8 +101,8 @@ fn every_convention_gives_every_byte_back() {
                     .iter()
                     .map(|dim| i64::try_from(*dim).unwrap())
                     .collect();
-                assert_eq!(reading.layout(&dims, [11, 24]), Some((layout, 3)));
-                let bytes = reading
+                assert_eq!(decoding.layout(&dims, [11, 24]), Some((layout, 3)));
+                let bytes = decoding
                     .bytes(samples, layout, [11, 24], whole(&image))
                     .unwrap();
                 assert_eq!(bytes, image.samples(), "{layout} {element} {range} {color}");
@@ -112,19 +112,18 @@ fn every_convention_gives_every_byte_back() {
                     right: 7,
                     bottom: 3,
                 };
-                let bytes = reading.bytes(samples, layout, [11, 24], part).unwrap();
+                let bytes = decoding.bytes(samples, layout, [11, 24], part).unwrap();
                 assert_eq!(bytes, image.samples()[(2 * 24 + 3) * 3..][..12]);
-                // Planes of floats, for models of a fixed size, are fed and read in the same way.
-                let certainty = Certainty::Known;
-                let read = |part| {
-                    let planes = reading.planes(samples, (layout, 3), [11, 24], part, certainty);
-                    planes.unwrap().to_rgb(Rounding::Round).unwrap()
-                };
-                assert_eq!(read(part).samples(), bytes);
-                assert_eq!(read(whole(&image)), image);
+                // Planes of floats are encoded and decoded in the same way.
+                for (window, expected) in [(part, &bytes[..]), (whole(&image), image.samples())] {
+                    let planes = decoding
+                        .planes(samples, layout, 3, [11, 24], window, Certainty::Known)
+                        .unwrap();
+                    assert_eq!(planes.to_rgb(Rounding::Round).unwrap().samples(), expected);
+                }
                 if element != ElementType::Float16 {
                     let planes = Planes::from_rgb(&image);
-                    let fed = feeding.tensor(&FedImage::Whole(&planes)).unwrap();
+                    let fed = encoding.tensor(&FedImage::Whole(&planes)).unwrap();
                     assert!(near(&fed.data, &input.data) && fed.dims == input.dims);
                 }
             }
@@ -133,20 +132,20 @@ fn every_convention_gives_every_byte_back() {
 }
 
 #[test]
-fn mean_and_deviation_are_the_models_channels() {
+fn mean_and_deviation_follow_the_models_channel_order() {
     let image = Rgb::new(1, 1, vec![255, 0, 51]).unwrap();
-    let feeding = Feeding {
+    let encoding = InputEncoding {
         mean: [0.5, 0.25, 0.0],
         std: [0.5, 0.25, 0.1],
-        ..FEEDING
+        ..ENCODING
     };
-    let input = fed(&feeding, &image, whole(&image));
+    let input = encode(&encoding, &image, whole(&image));
     assert_eq!(floats(&input), [1.0, -1.0, 2.0]);
-    let blue_first = Feeding {
+    let blue_first = InputEncoding {
         color: ChannelOrder::Bgr,
-        ..feeding
+        ..encoding
     };
-    let input = fed(&blue_first, &image, whole(&image));
+    let input = encode(&blue_first, &image, whole(&image));
     assert_eq!(floats(&input), [(0.2 - 0.5) / 0.5, -1.0, 10.0]);
 }
 
@@ -163,13 +162,13 @@ fn pixels_beyond_the_image_are_padded() {
         (Padding::Replicate, [1, 2, 3, 3, 3, 3, 3, 3], 1),
         (Padding::Zero, [1, 2, 3, 0, 0, 0, 0, 0], 0),
     ] {
-        let feeding = Feeding {
+        let encoding = InputEncoding {
             pad,
             element: ElementType::Uint8,
             range: ValueRange::Bytes,
-            ..FEEDING
+            ..ENCODING
         };
-        let TensorData::Uint8(bytes) = fed(&feeding, &image, wide).data else {
+        let TensorData::Uint8(bytes) = encode(&encoding, &image, wide).data else {
             panic!("no bytes");
         };
         assert_eq!(bytes[..8], row, "{pad}");
@@ -186,91 +185,96 @@ fn samples_are_clamped_and_rounded() {
         right: 2,
         bottom: 1,
     };
-    let bytes = |rounding| {
-        let reading = OutputReading {
+    // The third value is 0.5 · 255 = 127.5.
+    for (rounding, expected) in [
+        (Rounding::Round, [0, 128, 1, 255, 255, 2]),
+        (Rounding::Truncate, [0, 127, 1, 255, 255, 1]),
+    ] {
+        let decoding = OutputDecoding {
             rounding,
-            ..reading()
+            ..decoding()
         };
         let samples = TensorSamples::Float32(&values);
-        reading
+        let bytes = decoding
             .bytes(samples, TensorLayout::Nchw, [1, 2], part)
-            .unwrap()
-    };
-    // 0.5 · 255 = 127.5
-    assert_eq!(bytes(Rounding::Round), [0, 128, 1, 255, 255, 2]);
-    assert_eq!(bytes(Rounding::Truncate), [0, 127, 1, 255, 255, 1]);
+            .unwrap();
+        assert_eq!(bytes, expected);
+    }
     for i in 0..=u16::MAX {
         let code = f32::from(i) / 257.0;
-        assert_eq!(nearest(code), code.round() as u8);
+        assert_eq!(round_to_u8(code), code.round() as u8);
     }
-    assert_eq!((nearest(0.499_999_97), nearest(254.5)), (0, 255));
+    assert_eq!((round_to_u8(0.499_999_97), round_to_u8(254.5)), (0, 255));
 }
 
 #[test]
-fn values_of_another_range_are_refused() {
-    let checked = |values: &[f32], range, certainty| check(values, range, certainty).err();
-    let likely = |values: &[f32], range| match checked(values, range, Certainty::Assumed) {
-        Some(OutOfRange::Beyond { likely, .. }) => Some(likely),
-        other => {
-            assert_eq!(other, None);
-            None
-        }
-    };
-    assert_eq!(
-        likely(&[0.0, 200.0], ValueRange::Unit),
-        Some(ValueRange::Bytes)
-    );
-    assert_eq!(
-        likely(&[-0.9, 0.3], ValueRange::Unit),
-        Some(ValueRange::Signed)
-    );
-    assert_eq!(
-        likely(&[0.0, 0.9], ValueRange::Bytes),
-        Some(ValueRange::Unit)
-    );
-    // A model that does not clamp overshoots by a little, or rarely by much.
-    assert_eq!(likely(&[-0.1, 1.4], ValueRange::Unit), None);
+fn values_outside_an_assumed_range_are_refused() {
+    for (values, range, expected) in [
+        ([0.0, 200.0], ValueRange::Unit, ValueRange::Bytes),
+        ([-0.9, 0.3], ValueRange::Unit, ValueRange::Signed),
+        ([0.0, 0.9], ValueRange::Bytes, ValueRange::Unit),
+    ] {
+        let Err(InvalidValues::OutOfRange { likely, .. }) =
+            check_values(&values, range, Certainty::Assumed)
+        else {
+            panic!("{values:?} passes");
+        };
+        assert_eq!(likely, expected, "{values:?}");
+    }
+    // A model that does not clamp overshoots a little, or rarely a lot.
     let mut rare = vec![0.5; 1000];
     rare[0] = -3.0;
     rare[1] = 40.0;
-    assert_eq!(likely(&rare, ValueRange::Unit), None);
-    assert_eq!(
-        checked(&[0.0, 200.0], ValueRange::Unit, Certainty::Known),
-        None
-    );
-    let broken = checked(&[0.0, f32::NAN], ValueRange::Unit, Certainty::Known);
-    assert_eq!(broken, Some(OutOfRange::NotNumbers));
+    for values in [&[-0.1, 1.4][..], &rare] {
+        assert_eq!(
+            check_values(values, ValueRange::Unit, Certainty::Assumed),
+            Ok(())
+        );
+    }
 }
 
 #[test]
-fn the_luma_of_an_expression_is_fed_in_its_range() {
+fn only_nan_is_refused_in_a_known_range() {
+    for (values, expected) in [
+        ([0.0, 200.0], Ok(())),
+        ([0.0, f32::NAN], Err(InvalidValues::NanOutput)),
+    ] {
+        assert_eq!(
+            check_values(&values, ValueRange::Unit, Certainty::Known),
+            expected
+        );
+    }
+}
+
+fn assert_near(values: &[f32], expected: [f32; 2]) {
+    assert_eq!(values.len(), 2);
+    for (value, expected) in values.iter().zip(expected) {
+        assert!((value - expected).abs() < 1e-6, "{values:?}");
+    }
+}
+
+#[test]
+fn luma_of_an_expression_is_encoded_in_its_range() {
     let image = Rgb::new(1, 2, vec![255, 0, 51, 51, 51, 51]).unwrap();
-    let luma = Feeding {
+    let luma = InputEncoding {
         channels: Channels::Y,
         range: ValueRange::Signed,
-        ..FEEDING
+        ..ENCODING
     };
-    let input = fed(&luma, &image, whole(&image));
+    let input = encode(&luma, &image, whole(&image));
     assert_eq!(input.dims, [1, 1, 1, 2]);
-    let near = |values: &[f32], expected: [f32; 2]| {
-        let pairs = values.iter().zip(expected);
-        assert!(
-            pairs.clone().all(|(a, b)| (a - b).abs() < 1e-6),
-            "{values:?}"
-        );
-    };
-    near(floats(&input), [2.0 * (0.299 + 0.114 * 0.2) - 1.0, -0.6]);
-    // The expression is of the dark image in 0..1, before luma and range.
-    let squared = Feeding {
+    assert_near(floats(&input), [2.0 * (0.299 + 0.114 * 0.2) - 1.0, -0.6]);
+    // The expression is evaluated on the image in 0..1, before luma and range.
+    let squared = InputEncoding {
         input: "image ^ 2".parse().ok(),
         ..luma
     };
-    let input = fed(&squared, &image, whole(&image));
-    near(floats(&input), [2.0 * (0.299 + 0.114 * 0.04) - 1.0, -0.92]);
-    let endless = Feeding {
+    let input = encode(&squared, &image, whole(&image));
+    assert_near(floats(&input), [2.0 * (0.299 + 0.114 * 0.04) - 1.0, -0.92]);
+    let infinite = InputEncoding {
         input: "image / 0".parse().ok(),
-        ..FEEDING
+        ..ENCODING
     };
     let planes = Planes::from_rgb(&image);
-    assert_eq!(endless.tensor(&FedImage::Whole(&planes)), None);
+    assert_eq!(infinite.tensor(&FedImage::Whole(&planes)), None);
 }

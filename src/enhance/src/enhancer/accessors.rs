@@ -1,13 +1,13 @@
-//! Accessors of an enhancer for the probe and `enhance doctor`, and updates of its usage note.
+//! Accessors of an enhancer for the probe and `enhance doctor`, and updates of its [`Usage`].
 
 use std::path::{Path, PathBuf};
 
 use super::Enhancer;
 use crate::conventions::sidecar::{self, ModelSidecar};
-use crate::conventions::{Channels, ElementType, ValueRange, ValueScale};
+use crate::conventions::{Channels, ValueRange, ValueScale};
 use crate::graphs::Graph;
 use crate::probes::{RangePair, Usage};
-use crate::sizing::TakenSizes;
+use crate::sizing::AcceptedSizes;
 use darkqa_ground::error::Result;
 use darkqa_ground::types::SizeLog;
 use darkqa_ground::types::manifests::{ProbeNote, ProbeOutcome};
@@ -23,13 +23,13 @@ impl Enhancer {
         sidecar::path_for(&self.path)
     }
 
-    /// Handle to the enhancer's counters.
+    /// Handle to the enhancer's convention, caveats and counts, for manifests and reports.
     #[must_use]
     pub fn usage(&self) -> Usage {
         self.usage.clone()
     }
 
-    /// Replaces the usage note: from now on the enhancer writes into `usage`.
+    /// The enhancer with another usage record, into which it writes from now on.
     pub(crate) fn with_usage(self, usage: Usage) -> Self {
         let enhancer = Self { usage, ..self };
         enhancer.note_convention();
@@ -48,8 +48,8 @@ impl Enhancer {
     /// Value ranges in which the input is currently encoded and the output decoded.
     pub(crate) fn ranges(&self) -> RangePair {
         RangePair {
-            input: ValueScale::Range(self.graph.feeding.range),
-            output: ValueScale::Range(self.graph.reading.range()),
+            input: ValueScale::Range(self.graph.encoding.range),
+            output: ValueScale::Range(self.graph.decoding.range()),
         }
     }
 
@@ -66,13 +66,11 @@ impl Enhancer {
         let has_expression = convention.input.is_some() || convention.image.is_some();
         let implied =
             (self.description.preset.is_some() || has_expression).then_some(ValueRange::Unit);
-        let stated = |range: Option<ValueRange>, element: &ElementType| {
-            range.or(element.certain_range()).or(implied)
-        };
         [
-            stated(range_in, &signature.input.port.element),
-            stated(range_out, &signature.outputs[0].port.element),
+            (range_in, &signature.input.port.element),
+            (range_out, &signature.outputs[0].port.element),
         ]
+        .map(|(range, element)| range.or(element.implied_range()).or(implied))
     }
 
     /// True if a preset defines input and output, and the sidecar overrides neither a value range nor the channel order of
@@ -102,68 +100,71 @@ impl Enhancer {
 
     /// Adds a caveat for readers of the results: a sentence that follows the model's name.
     pub(crate) fn remark(&mut self, text: &str) {
-        let text = sidecar::named(text, &self.path);
+        let text = sidecar::insert_sidecar_name(text, &self.path);
         if !self.description.remarks.contains(&text) {
             self.description.remarks.push(text);
         }
         self.note_convention();
     }
 
-    /// Replaces the caveats for readers of the results by those of an earlier trial.
+    /// Replaces the caveats for readers of the results, for example by those of an earlier probe.
     pub(crate) fn set_remarks(&mut self, remarks: &[String]) {
         self.description.remarks = remarks.to_vec();
         self.note_convention();
     }
 
     /// Logs the caveats for readers of the results as warnings.
-    pub(crate) fn warn_of_remarks(&self) {
+    pub(crate) fn log_remarks(&self) {
         for remark in &self.description.remarks {
             tracing::warn!("{}: {remark}", self.name);
         }
     }
 
-    /// Height and width of a probe frame: the given size, filled up to the model's multiple, or the size that the model fixes.
+    /// Height and width of a probe frame: the given size padded to the model's multiple, or the model's fixed size.
     pub(crate) fn probe_size(&self, size: [usize; 2]) -> [usize; 2] {
         let mut rule = self.rule(size);
-        if let Some(TakenSizes::Multiple(multiple)) = self.search.found() {
+        if let Some(AcceptedSizes::Multiple(multiple)) = self.search.found() {
             rule.multiple = multiple;
         }
-        rule.whole(size)
+        rule.run_size(size)
     }
 
-    /// Resets the counts of size adaptations.
-    pub fn count_anew(&mut self) {
+    /// Resets the counts of padded, tiled and resized images.
+    pub fn reset_counts(&mut self) {
         self.log = SizeLog::default();
         self.usage.set_sizes(self.twin, &self.log);
-        self.usage.count_stored_anew();
+        self.usage.reset_stored_counts();
     }
 
     /// Sizes that the model accepts, if they were found by trial.
-    pub(crate) fn found_sizes(&self) -> Option<TakenSizes> {
+    pub(crate) fn found_sizes(&self) -> Option<AcceptedSizes> {
         self.search.found()
     }
 
-    /// Stores the result of the probe, and states the current value ranges in the convention. From then on no output value counts as
-    /// out of range.
+    /// Records the result of the probe, and writes the current value ranges into the convention as stated ones. Later output values
+    /// outside these ranges are clamped without an error.
     ///
     /// # Errors
     /// If the graph contradicts its own convention, which is a bug.
-    pub(crate) fn set_probed(&mut self, probe: ProbeNote) -> Result<()> {
+    pub(crate) fn set_probe_result(&mut self, probe: ProbeNote) -> Result<()> {
         let is_stated = self.stated_ranges().iter().all(Option::is_some);
         let ranges = self.ranges();
         let convention = self.convention().clone();
-        let convention = convention.fed(ranges.input).read(ranges.output);
+        let convention = convention
+            .with_input_scale(ranges.input)
+            .with_output_scale(ranges.output);
         self.graph = self
             .graph
             .with_convention(convention)
-            .map_err(|problem| self.fault(problem))?;
-        self.description.assumed |= !is_stated && probe.outcome == ProbeOutcome::Plausible;
+            .map_err(|problem| self.error(problem))?;
+        self.description.has_assumed_ranges |=
+            !is_stated && probe.outcome == ProbeOutcome::Plausible;
         self.usage.update(|note| note.probe = Some(probe));
         self.note_convention();
         Ok(())
     }
 
-    /// Writes the convention, with the source of each value, and the caveats into the usage note.
+    /// Copies the convention, with the source of each value, and the caveats into the usage record.
     pub(super) fn note_convention(&self) {
         let lines = self.description.lines(&self.graph, self.convention());
         let remarks = &self.description.remarks;
@@ -174,8 +175,8 @@ impl Enhancer {
     }
 }
 
-/// The value range that mean and deviation refer to: 0..1 if they are stated and no magnitude exceeds 2; otherwise unknown, because
-/// other libraries state them for 0..255.
+/// Value range to which a mean and a deviation refer: 0..1 if one is stated and no magnitude exceeds 2. Otherwise unknown, because some
+/// libraries state them for 0..255.
 fn range_of_normalisation(mean_and_std: [Option<[f32; 3]>; 2]) -> Option<ValueRange> {
     let mut numbers = mean_and_std.into_iter().flatten().flatten().peekable();
     let is_stated = numbers.peek().is_some();
