@@ -53,7 +53,7 @@ impl SuggestedScenes {
             })
     }
 
-    /// Groups frames by the scene that `scene_of` finds in each name. `None` if a name has no scene or the groups are unlikely to be scenes.
+    /// Groups frames by scene, which `scene_of` finds in the name. `None` if a name has no scene or the groups are unlikely to be scenes.
     fn grouped(
         frames: &BTreeSet<&str>,
         by: NamedBy,
