@@ -225,6 +225,6 @@ pub mod questions {
 pub mod score {
     /// The choice in a reply, by exact match.
     pub mod choice {
-        pub use darkqa_score::choice::{ReadingMode, read, readings};
+        pub use darkqa_score::choice::{ParsingMode, read, readings};
     }
 }

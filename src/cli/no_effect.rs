@@ -305,7 +305,7 @@ impl NoEffect {
         }
         if !kinds.iter().any(|kind| kind.has_noise()) {
             self.because("no variant has noise", &sensor());
-        } else if !kinds.iter().any(|kind| kind.has_readings()) {
+        } else if !kinds.iter().any(|kind| kind.has_profiles()) {
             let mut idle = sensor();
             idle.retain(|id| !SENSOR_FLAGS_OF_AUTO.contains(&&**id));
             let why = "automatic exposure has the reading physical, and a gain of its own (--auto)";

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
 
-use super::{Dataset, Picture, ReadingRule};
+use super::{Dataset, DecodeRule, Picture};
 use crate::error::{Error, Result};
 use crate::types::FrameId;
 
@@ -27,7 +27,7 @@ impl Inputs {
     ///
     /// # Errors
     /// If an input is missing, two frames would have the same output name, or a name leads outside the output folder.
-    pub(crate) fn open(inputs: &[PathBuf], further: &[PathBuf], rule: ReadingRule) -> Result<Self> {
+    pub(crate) fn open(inputs: &[PathBuf], further: &[PathBuf], rule: DecodeRule) -> Result<Self> {
         let sets: Vec<Dataset> = inputs
             .iter()
             .map(|path| Ok(Dataset::from_images(path, further)?.with_rule(rule)))

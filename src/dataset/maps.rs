@@ -10,10 +10,10 @@ use ndarray::Array2;
 use crate::error::{Error, Result};
 use crate::files::reading;
 use crate::picture::ImageFile;
+use crate::picture::decode_rule::MAX_PIXELS;
 use crate::picture::image_file::StatedOrientation;
 use crate::picture::npy::Npy;
 use crate::picture::raw_png::{RawPng, SampleForm};
-use crate::picture::reading_rule::MAX_PIXELS;
 use crate::types::Digest;
 
 /// Maximum depth of a pixel, in millimetres: a kilometre, deeper than any room (chosen). A larger value means a wrong unit, such as

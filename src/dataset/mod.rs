@@ -30,7 +30,7 @@ use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
 use crate::error::{Error, Result};
-use crate::picture::{ImageFile, ReadingRule};
+use crate::picture::{DecodeRule, ImageFile};
 use crate::rooms::{self, Rooms};
 use crate::types::text::excerpt;
 use crate::types::{Frame, FrameId, Labels, PhotoName, Question};
@@ -97,7 +97,7 @@ pub struct Dataset {
     scenes: SceneNames,
     questions: Vec<Question>,
     labels: Option<Labels>,
-    rule: ReadingRule,
+    rule: DecodeRule,
     /// How a ready-made set was read (column mapping, omissions), one fact per line; empty for other data.
     summary: Vec<String>,
     format: SetFormat,
@@ -118,7 +118,7 @@ impl Dataset {
             scenes: SceneNames::new(),
             questions,
             labels: None,
-            rule: ReadingRule::default(),
+            rule: DecodeRule::default(),
             summary: Vec::new(),
             format: SetFormat::Native,
             rows: RowCounts::default(),
@@ -268,7 +268,7 @@ impl Dataset {
 
     /// Sets the rule by which images are decoded.
     #[must_use]
-    pub fn with_rule(self, rule: ReadingRule) -> Self {
+    pub fn with_rule(self, rule: DecodeRule) -> Self {
         Self { rule, ..self }
     }
 

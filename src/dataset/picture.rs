@@ -1,8 +1,8 @@
 //! Image of a frame before decoding: [`Picture`].
 
 use crate::error::Result;
+use crate::picture::DecodeRule;
 use crate::picture::ImageFile;
-use crate::picture::ReadingRule;
 use crate::rooms::Room;
 use crate::types::{Digest, InputNote, Pixels, Rgb};
 
@@ -12,7 +12,7 @@ pub enum Picture {
     /// Bytes of an image file.
     Encoded(ImageFile),
     /// A built-in room, drawn on demand, and the rule that scales its light.
-    Drawn(Room, ReadingRule),
+    Drawn(Room, DecodeRule),
 }
 
 impl Picture {

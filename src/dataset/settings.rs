@@ -10,7 +10,7 @@ use clap::Args;
 use super::bank::BankPlace;
 use super::ready_made::{is_known_set, known_sets};
 use super::{DataPlace, RootArgs, SetArgs};
-use crate::picture::reading_rule::{ColourRule, MAX_PIXELS, ReadingRule, Transfer};
+use crate::picture::decode_rule::{ColourRule, DecodeRule, MAX_PIXELS, Transfer};
 use crate::rooms::Rooms;
 use crate::types::{Decides, Family, shell_word};
 
@@ -126,8 +126,8 @@ fn parse_exposure(text: &str) -> Result<f32, String> {
 
 impl DecodeArgs {
     /// Rule by which images are decoded.
-    pub(crate) fn rule(self) -> ReadingRule {
-        ReadingRule {
+    pub(crate) fn rule(self) -> DecodeRule {
+        DecodeRule {
             max_pixels: self.limit.max_pixels.get(),
             colour: self.colour,
             transfer: self.transfer,

@@ -12,7 +12,7 @@ use crate::images::recipes::Recipe;
 use crate::picture::Scaling;
 use crate::types::degradations::Kind;
 use crate::types::manifests::Columns;
-use crate::types::{Degradation, Digest, PairDark, ReadingName};
+use crate::types::{Degradation, Digest, PairDark, ProfileName};
 use darkqa_enhance::{self, SizeArgs, Tiling};
 use darkqa_light::{KindSettings, Synthesis, version};
 
@@ -58,7 +58,7 @@ pub(crate) fn columns<'a>(
     });
     let enhancers = enhancers.chain(elsewhere);
     let degradations = settings.light.degradations();
-    let profiles: BTreeSet<&ReadingName> = degradations
+    let profiles: BTreeSet<&ProfileName> = degradations
         .iter()
         .flatten()
         .filter_map(Degradation::reading)

@@ -8,11 +8,11 @@ use ndarray::Array2;
 use crate::dataset::maps::{DepthFile, millimetres};
 use crate::error::{Error, Result};
 use crate::files::reading::{bytes, entries, text};
+use crate::picture::decode_rule::MAX_PIXELS;
 use crate::picture::hdf5::Hdf5Array;
 use crate::picture::npy::Npy;
 use crate::picture::raw_png::{RawPng, SampleForm};
-use crate::picture::reading_rule::MAX_PIXELS;
-use crate::picture::{ImageFile, ReadingRule};
+use crate::picture::{DecodeRule, ImageFile};
 use crate::types::Rgb;
 
 /// File name endings of maps.
@@ -54,7 +54,7 @@ pub(super) fn first_folder(folder: &Path, names: &[&str]) -> Option<PathBuf> {
 
 /// Decodes an image of ids, ignoring its EXIF orientation.
 pub(super) fn read_id_image(path: &Path) -> Result<Rgb> {
-    let file = ImageFile::open(path, ReadingRule::default())?;
+    let file = ImageFile::open(path, DecodeRule::default())?;
     file.ignoring_orientation().decode()
 }
 

@@ -11,7 +11,7 @@ use crate::text::table::ColumnKind::{Count, Text};
 use crate::text::table::TableBuilder;
 use crate::text::terminal;
 use crate::text::words::counted;
-use crate::types::ReadingName;
+use crate::types::ProfileName;
 
 /// Estimate for the remaining requests of one model.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -38,14 +38,14 @@ pub(crate) struct CostLine {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub charged_image_tokens: Option<f64>,
     /// The same requests by the noise profile of their images.
-    pub readings: Vec<ReadingCost>,
+    pub readings: Vec<ProfileCost>,
 }
 
 /// Remaining requests with images of one noise profile.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct ReadingCost {
+pub(crate) struct ProfileCost {
     /// Noise profile; `None` for requests that all profiles share: L0, images without noise, and no image at all.
-    pub reading: Option<ReadingName>,
+    pub reading: Option<ProfileName>,
     /// Number of requests left.
     pub requests: usize,
     /// Cost in dollars if each reply is short; `None` if no price is known.
@@ -296,7 +296,7 @@ fn by_endpoint(lines: &[CostLine]) -> String {
 
 /// Line with the requests of all models by noise profile; empty with fewer than two profiles.
 fn by_reading(lines: &[CostLine]) -> String {
-    let mut sums = BTreeMap::<Option<&ReadingName>, (usize, Option<f64>)>::new();
+    let mut sums = BTreeMap::<Option<&ProfileName>, (usize, Option<f64>)>::new();
     for cost in lines.iter().flat_map(|line| &line.readings) {
         let (requests, dollars) = sums.entry(cost.reading.as_ref()).or_insert((0, Some(0.0)));
         *requests += cost.requests;
@@ -310,7 +310,7 @@ fn by_reading(lines: &[CostLine]) -> String {
         .map(|(reading, (requests, dollars))| {
             let name = reading.map_or(
                 "shared by all (L0, exposure drop, blind)",
-                ReadingName::as_str,
+                ProfileName::as_str,
             );
             let price = dollars.map_or("price unknown".to_owned(), money);
             format!("{name} {} ({price})", count(requests as f64))
@@ -385,15 +385,15 @@ mod tests {
         );
     }
 
-    fn cost(reading: Option<&str>, requests: usize, dollars: Option<f64>) -> ReadingCost {
-        ReadingCost {
-            reading: reading.map(|name| ReadingName::new(name).unwrap()),
+    fn cost(reading: Option<&str>, requests: usize, dollars: Option<f64>) -> ProfileCost {
+        ProfileCost {
+            reading: reading.map(|name| ProfileName::new(name).unwrap()),
             requests,
             dollars,
         }
     }
 
-    fn line(readings: Vec<ReadingCost>) -> CostLine {
+    fn line(readings: Vec<ProfileCost>) -> CostLine {
         CostLine {
             model: "m".to_owned(),
             endpoints: Vec::new(),

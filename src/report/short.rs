@@ -24,7 +24,7 @@ use crate::text::wrapped::{WIDTH, wrapped};
 use crate::types::manifests::RunManifest;
 use crate::types::{Axis, AxisLevel};
 use darkqa_score::accuracies::{AccuracyCell, Health};
-use darkqa_score::choice::ReadingMode;
+use darkqa_score::choice::ParsingMode;
 use darkqa_score::grid::Grid;
 use darkqa_score::model_in_condition::models_under_test;
 
@@ -181,7 +181,7 @@ impl AccuracyRow<'_> {
 fn accuracy_table(report: &ChoiceReport<'_>) -> String {
     let common = report.findings.common.as_ref();
     let summary = common.map_or(&report.findings.summary, |common| &common.summary);
-    let cells = summary.family_cells(None, ReadingMode::Strict);
+    let cells = summary.family_cells(None, ParsingMode::Strict);
     let ladder = Ladder::new(cells.map(|cell| (&cell.subject, cell)))
         .with_pairs(report.findings)
         .with_clean();

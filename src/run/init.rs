@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 use crate::files::{reading, write};
 use crate::images::progress::Progress;
 use crate::images::trials::questions::open_data;
-use crate::picture::ReadingRule;
+use crate::picture::DecodeRule;
 use crate::picture::png;
 use crate::runs::Outcome;
 use crate::text::words::counted;
@@ -144,7 +144,7 @@ fn room_rows(folder: &Path, progress: &Progress) -> Result<Vec<Row>> {
         &set,
         &selection,
         &rules,
-        ReadingRule::default(),
+        DecodeRule::default(),
         progress,
     )?;
     let mut rows = Vec::new();

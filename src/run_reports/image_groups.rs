@@ -49,7 +49,7 @@ impl LightCurve {
         let kind = if self.variant.is_untouched() {
             "L0".to_owned()
         } else {
-            self.variant.kind_and_reading()
+            self.variant.kind_and_profile()
         };
         match &self.enhancer {
             None => kind,
@@ -304,7 +304,7 @@ fn same_by_manifest(curve: &LightCurve, one: &RunManifest, other: &RunManifest) 
         if let Some(kind) = kind {
             all.extend(settings::variant_settings(run, kind));
         }
-        if kind.is_some_and(Kind::has_readings) {
+        if kind.is_some_and(Kind::has_profiles) {
             all.extend(settings::noise_settings(run, &runs));
         }
         if curve.enhancer.is_some() {

@@ -6,7 +6,7 @@ use super::lights::Topic;
 use super::sentence::{Numbers, Sentence, Tone, capitalised};
 use crate::text::words::light;
 use crate::types::{AxisLevel, UnreadReason, Variant, View};
-use darkqa_score::choice::ReadingMode;
+use darkqa_score::choice::ParsingMode;
 use darkqa_score::comparisons::pool;
 use darkqa_score::estimate::Estimate;
 use darkqa_score::findings::Findings;
@@ -87,7 +87,7 @@ impl OnSameQuestions {
         let own = find(name)?;
         let cell = findings
             .summary
-            .cell(&grid.subjects[own], None, ReadingMode::Strict)?;
+            .cell(&grid.subjects[own], None, ParsingMode::Strict)?;
         let answered: Vec<usize> = (0..grid.items.len())
             .filter(|item| grid.result(own, *item).is_reply())
             .collect();
@@ -117,7 +117,7 @@ fn accuracy(grid: &Grid<'_>, subject: usize, items: &[usize]) -> Option<f64> {
         .collect();
     let (mut right, mut replies) = (0, 0);
     for (index, item) in grid.items.iter().enumerate() {
-        let reading = grid.result(subject, index).reading(ReadingMode::Strict);
+        let reading = grid.result(subject, index).reading(ParsingMode::Strict);
         if let (Some(chosen), true) = (reading, asked.contains(&item.asked.question)) {
             replies += 1;
             right += usize::from(item.is_right(chosen));

@@ -6,7 +6,7 @@ use crate::text::table::ColumnKind::{Count, Number, P, Text};
 use crate::text::table::{ColumnHeads, Table, TableBuilder, TableCell};
 use crate::text::words::{self, ends_in_points, points, reach, stops};
 use crate::types::degradations::Kind;
-use crate::types::{AxisLevel, ReadingName};
+use crate::types::{AxisLevel, ProfileName};
 use darkqa_score::accuracies::Curve;
 use darkqa_score::comparisons::{
     FindingByProfile, NoiseHypothesis, Robustness, Support, TestedEffect,
@@ -20,7 +20,7 @@ pub(super) fn by_reading(findings: &Findings<'_>) -> Vec<Table> {
     let Some(first) = found.first() else {
         return Vec::new();
     };
-    let readings: Vec<&ReadingName> = first.effects.iter().map(|effect| &effect.profile).collect();
+    let readings: Vec<&ProfileName> = first.effects.iter().map(|effect| &effect.profile).collect();
     vec![file_table(found), report_table(findings, &readings)]
 }
 
@@ -79,7 +79,7 @@ impl Row<'_> {
 }
 
 /// Table for the terminal and the page: the findings of each model, then its thresholds.
-fn report_table(findings: &Findings<'_>, readings: &[&ReadingName]) -> Table {
+fn report_table(findings: &Findings<'_>, readings: &[&ProfileName]) -> Table {
     let mut rows = Vec::new();
     let found = &findings.by_profile;
     for same_model in found.chunk_by(|a, b| (&a.model, &a.group) == (&b.model, &b.group)) {
@@ -141,7 +141,7 @@ fn noise_curves<'f>(findings: &'f Findings<'_>, finding: &FindingByProfile) -> V
         .filter(|curve| {
             curve.model == finding.model
                 && curve.variant.group == finding.group
-                && curve.variant.kind.is_some_and(Kind::has_readings)
+                && curve.variant.kind.is_some_and(Kind::has_profiles)
                 && curve.enhancer.is_none()
                 && curve.family.is_none()
         })
@@ -149,7 +149,7 @@ fn noise_curves<'f>(findings: &'f Findings<'_>, finding: &FindingByProfile) -> V
 }
 
 /// Threshold with its interval under one noise profile, in words.
-fn threshold(curves: &[&Curve], reading: &ReadingName) -> String {
+fn threshold(curves: &[&Curve], reading: &ProfileName) -> String {
     let Some(curve) = curves
         .iter()
         .find(|curve| curve.variant.reading.as_ref() == Some(reading))
@@ -339,12 +339,12 @@ fn notes(found: &[FindingByProfile]) -> Vec<String> {
 mod tests {
     use super::*;
     use crate::types::Severity;
-    use darkqa_score::comparisons::EffectInReading;
+    use darkqa_score::comparisons::EffectInProfile;
     use darkqa_score::estimate::Estimate;
 
     fn effect_in(reading: &str, low: f64, high: f64, support: Support) -> EffectInProfile {
         EffectInProfile {
-            reading: ReadingName::new(reading).unwrap(),
+            profile: ProfileName::new(reading).unwrap(),
             effect: Some(TestedEffect {
                 difference: Estimate {
                     value: f64::midpoint(low, high),

@@ -5,7 +5,7 @@ use super::sections::{ENHANCERS, REAL};
 use crate::text::table::ColumnKind::{self, Count, Number, P, Percent, Points, Text};
 use crate::text::table::{Column, Table, TableBuilder, TableCell, TableFormat};
 use crate::text::words::{counted, name};
-use darkqa_score::choice::ReadingMode;
+use darkqa_score::choice::ParsingMode;
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::{Comparison, ComparisonKind, MIN_PAIRS};
 use darkqa_score::findings::Findings;
@@ -23,7 +23,7 @@ pub(super) fn comparisons(findings: &Findings<'_>) -> Vec<Table> {
             .iter()
             .filter(|comparison| comparison.kind == kind)
             .collect();
-        tables.push(table(kind, "", &all, ReadingMode::Lenient).in_files_only());
+        tables.push(table(kind, "", &all, ParsingMode::Lenient).in_files_only());
     }
     tables
 }
@@ -80,7 +80,7 @@ fn tables_by_kind(
             .iter()
             .map(|comparison| (comparison.least_holm, comparison.strict.paired.clusters));
         let clusters_note = too_few_clusters(least_p_values, &unit.to_string());
-        let mut overall_table = table(kind, caption, &overall, ReadingMode::Strict);
+        let mut overall_table = table(kind, caption, &overall, ParsingMode::Strict);
         overall_table.is_folded = !matches!(
             kind,
             ComparisonKind::Enhancer | ComparisonKind::RealSynthetic | ComparisonKind::RealEnhanced
@@ -96,7 +96,7 @@ fn tables_by_kind(
             overall_table.notes.extend(too_few_items(&overall));
         }
         let caption = format!("{caption}, by family");
-        let mut family_table = table(kind, &caption, &by_family, ReadingMode::Strict);
+        let mut family_table = table(kind, &caption, &by_family, ParsingMode::Strict);
         family_table.is_folded = true;
         tables.extend([overall_table, family_table]);
     }
@@ -225,7 +225,7 @@ fn table(
     kind: ComparisonKind,
     caption: &str,
     comparisons: &[&Comparison],
-    mode: ReadingMode,
+    mode: ParsingMode,
 ) -> Table {
     let section = match kind {
         ComparisonKind::Enhancer => ENHANCERS,
@@ -289,7 +289,7 @@ fn subject_columns(
 
 fn number_columns(
     builder: TableBuilder<&Comparison>,
-    mode: ReadingMode,
+    mode: ParsingMode,
 ) -> TableBuilder<&Comparison> {
     let difference = "csv difference low high | terminal difference, 95 % interval | page difference [95 %] \
                       | latex Difference [95\\,\\%]";

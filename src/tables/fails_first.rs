@@ -7,7 +7,7 @@ use crate::text::table::ColumnKind::{Count, Percent, Text};
 use crate::text::table::{ColumnHeads, Table, TableBuilder};
 use crate::text::words::{family as family_name, light, points};
 use crate::types::{AxisLevel, Family, FrameId, Variant};
-use darkqa_score::choice::ReadingMode;
+use darkqa_score::choice::ParsingMode;
 use darkqa_score::comparisons::{PooledFinding, PooledKind};
 use darkqa_score::findings::Findings;
 use darkqa_score::significance::{ALPHA, Significance, holm};
@@ -263,7 +263,7 @@ fn answers<'f>(
         }
         for (index, item) in grid.items.iter().enumerate() {
             let is_right = |subject: usize| {
-                let answer = grid.result(subject, index).reading(ReadingMode::Strict);
+                let answer = grid.result(subject, index).reading(ParsingMode::Strict);
                 answer.is_some_and(|choice| item.is_right(choice))
             };
             if is_right(*clean) {

@@ -6,7 +6,7 @@ use crate::text::table::ColumnKind::{Percent, Text};
 use crate::text::table::{ColumnHeads, Table, TableBuilder, TableCell};
 use crate::text::words::family as family_name;
 use crate::types::Family;
-use darkqa_score::choice::ReadingMode;
+use darkqa_score::choice::ParsingMode;
 use darkqa_score::findings::Findings;
 use darkqa_score::model_in_condition::ModelInCondition;
 
@@ -50,7 +50,7 @@ fn accuracy_cell(
 ) -> TableCell {
     let cell = findings
         .summary
-        .family_cells(family, ReadingMode::Strict)
+        .family_cells(family, ParsingMode::Strict)
         .find(|cell| match subject {
             Some(subject) => cell.subject == *subject,
             None => cell.subject.view.is_none(),

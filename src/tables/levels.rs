@@ -8,7 +8,7 @@ use crate::text::words::{ends, percent};
 use crate::types::UnreadReason;
 use crate::types::degradations::Axis;
 use darkqa_score::accuracies::{AccuracyCell, AccuracySummary};
-use darkqa_score::choice::ReadingMode;
+use darkqa_score::choice::ParsingMode;
 use darkqa_score::findings::Findings;
 
 /// Tables over all items and, if the models were asked different items, also over the items that they share.
@@ -29,7 +29,7 @@ pub(super) fn levels(findings: &Findings<'_>) -> Vec<Table> {
 
 /// One table for each axis. `items` is a caption text about the items; empty for all items.
 fn summary_tables(findings: &Findings<'_>, summary: &AccuracySummary, items: &str) -> Vec<Table> {
-    let strict = summary.family_cells(None, ReadingMode::Strict);
+    let strict = summary.family_cells(None, ParsingMode::Strict);
     let ladder = Ladder::new(strict.map(|cell| (&cell.subject, cell))).with_pairs(findings);
     let notes = notes(summary, &ladder);
     let mut tables: Vec<Table> = ladder
@@ -101,7 +101,7 @@ fn lenient_cell<'a>(
     summary.cell(
         &strict.subject,
         strict.family.as_ref(),
-        ReadingMode::Lenient,
+        ParsingMode::Lenient,
     )
 }
 
@@ -176,7 +176,7 @@ fn notes(summary: &AccuracySummary, ladder: &Ladder<'_, AccuracyCell>) -> Vec<St
         .into_iter()
         .map(|cell| note_without_images(summary, cell))
         .collect();
-    let mut all = summary.family_cells(None, ReadingMode::Strict);
+    let mut all = summary.family_cells(None, ParsingMode::Strict);
     let unit = if all.any(|cell| cell.always.is_some()) {
         "orders of choices"
     } else {

@@ -7,7 +7,7 @@ use crate::text::table::ColumnKind::{self, Count, Number, P, Percent, Points, Te
 use crate::text::table::{Table, TableBuilder};
 use crate::text::words::{counted, light, p};
 use darkqa_score::answers::confusion::FalseAnswer;
-use darkqa_score::choice::ReadingMode;
+use darkqa_score::choice::ParsingMode;
 use darkqa_score::comparisons::{PooledFinding, PooledKind};
 use darkqa_score::findings::Findings;
 use darkqa_score::significance::SwapMethod;
@@ -41,7 +41,7 @@ pub(super) fn pooled(findings: &Findings<'_>) -> Vec<Table> {
         .copied()
         .chain(&findings.averaged)
         .collect();
-    let mut total = table(&caption, column, &all, ReadingMode::Strict);
+    let mut total = table(&caption, column, &all, ParsingMode::Strict);
     if models.is_some_and(|models| models > 1) {
         total.heading = Some(format!(
             "Pooled over {of_models}, paired by question, in percentage points"
@@ -56,15 +56,15 @@ pub(super) fn pooled(findings: &Findings<'_>) -> Vec<Table> {
         &format!("Pooled over {of_models}, by family"),
         column,
         &by_family,
-        ReadingMode::Strict,
+        ParsingMode::Strict,
     );
     by_family.is_folded = true;
     let all: Vec<&PooledFinding> = findings.pooled.iter().chain(&findings.averaged).collect();
-    let lenient = table("", column, &all, ReadingMode::Lenient).in_files_only();
+    let lenient = table("", column, &all, ParsingMode::Lenient).in_files_only();
     vec![total, by_family, lenient]
 }
 
-fn table(caption: &str, models: &str, findings: &[&PooledFinding], mode: ReadingMode) -> Table {
+fn table(caption: &str, models: &str, findings: &[&PooledFinding], mode: ParsingMode) -> Table {
     let builder = TableBuilder::new("pooled", findings.iter().copied())
         .page("comparisons", caption)
         .column(Text, "csv kind", |finding| {
@@ -97,7 +97,7 @@ fn table(caption: &str, models: &str, findings: &[&PooledFinding], mode: Reading
 /// Adds the columns of numbers.
 fn number_columns(
     builder: TableBuilder<&PooledFinding>,
-    mode: ReadingMode,
+    mode: ParsingMode,
 ) -> TableBuilder<&PooledFinding> {
     builder
         .column(Count, "csv n | page n", |finding| finding.items)

@@ -5,7 +5,7 @@ use crate::text::table::{Table, TableBuilder, TableCell, TableFormat};
 use crate::text::words::counted;
 use crate::types::{Family, RunGroup, Variant};
 use darkqa_score::accuracies::{GroupCell, GroupChance, StrictScore};
-use darkqa_score::choice::ReadingMode;
+use darkqa_score::choice::ParsingMode;
 use darkqa_score::estimate::Estimate;
 use darkqa_score::findings::Findings;
 use darkqa_score::model_in_condition::{CHANCE, ModelInCondition};
@@ -106,7 +106,7 @@ fn table(
         )
         .family(Line::family)
         .column(Text, "csv mode", |line| match line {
-            Line::Cell(cell) if cell.mode == ReadingMode::Lenient => "lenient",
+            Line::Cell(cell) if cell.mode == ParsingMode::Lenient => "lenient",
             Line::Cell(_) | Line::Chance(..) => "strict",
         });
     let builder = number_columns(builder, findings, score)
@@ -124,7 +124,7 @@ fn table(
     for format in [TableFormat::Terminal, TableFormat::Page, TableFormat::Latex] {
         builder = builder.hide(
             format,
-            |line| matches!(line, Line::Cell(cell) if cell.mode == ReadingMode::Lenient),
+            |line| matches!(line, Line::Cell(cell) if cell.mode == ParsingMode::Lenient),
         );
     }
     builder.build()
@@ -175,7 +175,7 @@ fn number_columns<'a>(
             |line| {
                 let cell = findings
                     .summary
-                    .family_cells(line.family(), ReadingMode::Strict)
+                    .family_cells(line.family(), ParsingMode::Strict)
                     .find(|cell| match line {
                         Line::Cell(group_cell) => cell.subject == group_cell.subject,
                         Line::Chance(..) => cell.subject.view.is_none(),

@@ -3,10 +3,10 @@
 use crate::text::table::ColumnKind::{Count, Percent, Share, Text};
 use crate::text::table::{Table, TableBuilder, TableCell};
 use darkqa_score::accuracies::AccuracySummary;
-use darkqa_score::choice::ReadingMode;
+use darkqa_score::choice::ParsingMode;
 
 pub(super) fn subjects(summary: &AccuracySummary) -> Table {
-    let mut table = TableBuilder::new("subjects", summary.family_cells(None, ReadingMode::Strict))
+    let mut table = TableBuilder::new("subjects", summary.family_cells(None, ParsingMode::Strict))
         .page(
             "accuracy",
             "Accuracy of every subject, all families together",
@@ -24,7 +24,7 @@ pub(super) fn subjects(summary: &AccuracySummary) -> Table {
         })
         .column(Percent, "page lenient", |cell| {
             summary
-                .cell(&cell.subject, None, ReadingMode::Lenient)?
+                .cell(&cell.subject, None, ParsingMode::Lenient)?
                 .accuracy
         })
         .column(Count, "page n", |cell| cell.replies())

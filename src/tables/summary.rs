@@ -4,7 +4,7 @@ use crate::text::table::ColumnKind::{Count, Share, Text};
 use crate::text::table::{SUMMARY, Table, TableBuilder, TableCell};
 use crate::types::{ModelListing, PairDark, RunGroup};
 use darkqa_score::accuracies::{AccuracyCell, AccuracySummary};
-use darkqa_score::choice::ReadingMode;
+use darkqa_score::choice::ParsingMode;
 use darkqa_score::model_in_condition::ModelInCondition;
 
 /// Builds the table, with a row for each model in a condition, family and way of parsing.
@@ -13,8 +13,8 @@ pub(crate) fn summary(summary: &AccuracySummary, listing: &ModelListing) -> Tabl
         .subject(|cell| &cell.subject, |variant| variant.word().into_owned())
         .family(|cell| cell.family.as_ref())
         .column(Text, "csv mode", |cell| match cell.mode {
-            ReadingMode::Strict => "strict",
-            ReadingMode::Lenient => "lenient",
+            ParsingMode::Strict => "strict",
+            ParsingMode::Lenient => "lenient",
         })
         .column(Count, "csv n", |cell| cell.replies())
         .column(Count, "csv right", |cell| {

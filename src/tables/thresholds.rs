@@ -8,7 +8,7 @@ use crate::text::words::{counted, light};
 use crate::types::AxisLevel;
 use crate::types::degradations::Axis;
 use darkqa_score::accuracies::Curve;
-use darkqa_score::choice::ReadingMode;
+use darkqa_score::choice::ParsingMode;
 use darkqa_score::findings::Findings;
 use darkqa_score::threshold::{CurveSummary, NoThreshold, SparseLevel};
 
@@ -32,21 +32,21 @@ pub(super) fn thresholds(findings: &Findings<'_>) -> Vec<Table> {
 fn axis_tables(findings: &Findings<'_>, axis: Axis, curves: Vec<&Curve>) -> [Table; 3] {
     let titles = Titles::new(axis);
     let notes = notes(&curves);
-    let lenient = table(&titles, "", &curves, ReadingMode::Lenient).in_files_only();
+    let lenient = table(&titles, "", &curves, ParsingMode::Lenient).in_files_only();
     let (all_families, by_family): (Vec<&Curve>, Vec<&Curve>) =
         curves.into_iter().partition(|curve| curve.family.is_none());
     let heading = format!(
         "{} in {} (half-way from L0 to chance) and mean accuracy in %, with 95 % intervals by {}",
         titles.quantity, axis.unit, findings.unit
     );
-    let mut all_families = table(&titles, titles.caption, &all_families, ReadingMode::Strict);
+    let mut all_families = table(&titles, titles.caption, &all_families, ParsingMode::Strict);
     all_families.heading = (!all_families.rows.is_empty()).then_some(heading);
     all_families.notes = notes;
     if axis == Axis::LIGHT {
         all_families.notes.extend(finer_levels_note(findings));
     }
     let caption = format!("{} by family", titles.caption);
-    let mut by_family = table(&titles, &caption, &by_family, ReadingMode::Strict);
+    let mut by_family = table(&titles, &caption, &by_family, ParsingMode::Strict);
     by_family.is_folded = true;
     [all_families, by_family, lenient]
 }
@@ -90,7 +90,7 @@ impl Titles {
 }
 
 /// Builds the table of some curves. A threshold is `inf` beyond the darkest level, and empty if unknown.
-fn table(titles: &Titles, caption: &str, curves: &[&Curve], mode: ReadingMode) -> Table {
+fn table(titles: &Titles, caption: &str, curves: &[&Curve], mode: ParsingMode) -> Table {
     TableBuilder::new(titles.file, curves)
         .page("thresholds", caption)
         .curve(|curve| (&curve.model, &curve.variant, curve.enhancer.as_ref()))

@@ -4,13 +4,13 @@ use std::collections::BTreeSet;
 
 use serde::Serialize;
 
-use crate::types::ReadingName;
+use crate::types::ProfileName;
 use darkqa_score::model_in_condition::ModelInCondition;
 
 /// The noise profiles of the subjects with noise, `paper` first.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[serde(transparent)]
-pub(crate) struct NoiseProfiles(BTreeSet<ReadingName>);
+pub(crate) struct NoiseProfiles(BTreeSet<ProfileName>);
 
 impl NoiseProfiles {
     pub(crate) fn new<'s>(subjects: impl IntoIterator<Item = &'s ModelInCondition>) -> Self {

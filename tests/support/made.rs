@@ -1,7 +1,7 @@
 //! Records whose truth is known, as a run would have kept them.
 
 use darkqa_ground::types::{
-    AnswerReading, ChoiceDetail, Condition, Digest, Family, FrameId, QuestionId, Record,
+    ChoiceDetail, Condition, Digest, Family, FrameId, ParsedAnswer, QuestionId, Record,
     TrialOutcome,
 };
 
@@ -12,7 +12,7 @@ pub fn record(
     (question, frame): (usize, usize),
     right: bool,
 ) -> Record {
-    let chosen = AnswerReading {
+    let chosen = ParsedAnswer {
         chosen: Some(usize::from(!right)),
         why: None,
     };

@@ -1,7 +1,7 @@
 //! Parsing of the choice in a model's reply: [`read`] and [`readings`].
 //!
-//! Two parsings are always reported together. [`ReadingMode::Strict`] accepts a reply that is an answer and nothing else.
-//! [`ReadingMode::Lenient`] also finds an answer inside a reply; if two choices are possible, it accepts neither. No choice
+//! Two parsings are always reported together. [`ParsingMode::Strict`] accepts a reply that is an answer and nothing else.
+//! [`ParsingMode::Lenient`] also finds an answer inside a reply; if two choices are possible, it accepts neither. No choice
 //! is ever guessed. If the strict parsing finds a choice, the lenient parsing finds the same.
 //!
 //! A reply passes through `clean` (which removes hidden reasoning, invisible characters and leaked tokens), then `strict`, then the
@@ -44,14 +44,14 @@ pub const LENIENT_VERSION: &str = "lenient/4";
 /// The parsing of a reply: how much text may surround the answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum ReadingMode {
+pub enum ParsingMode {
     /// No other text: the reply is a choice's text, its letter, or its letter with its text. Headline numbers use this parsing.
     Strict,
     /// Sentences, markup, JSON or LaTeX around exactly one choice.
     Lenient,
 }
 
-impl ReadingMode {
+impl ParsingMode {
     /// Both parsings, the one of headline numbers first.
     pub const ALL: [Self; 2] = [Self::Strict, Self::Lenient];
 
@@ -71,17 +71,17 @@ impl ReadingMode {
 /// [`UnreadReason::Truncated`].
 ///
 /// ```
-/// use darkqa_choice::{ReadingMode, read};
+/// use darkqa_choice::{ParsingMode, read};
 /// use darkqa_ground::types::{Answer, Choices, UnreadReason};
 ///
 /// let choices = Choices::new(vec!["kitchen".into(), "bedroom".into()], 0)?;
-/// assert_eq!(read("(B) bedroom", &choices, ReadingMode::Strict), Answer::Chosen(1));
-/// assert_eq!(read("Answer: **B**", &choices, ReadingMode::Strict), Answer::Unparsed(UnreadReason::NoChoice));
-/// assert_eq!(read("Answer: **B**", &choices, ReadingMode::Lenient), Answer::Chosen(1));
+/// assert_eq!(read("(B) bedroom", &choices, ParsingMode::Strict), Answer::Chosen(1));
+/// assert_eq!(read("Answer: **B**", &choices, ParsingMode::Strict), Answer::Unparsed(UnreadReason::NoChoice));
+/// assert_eq!(read("Answer: **B**", &choices, ParsingMode::Lenient), Answer::Chosen(1));
 /// # Ok::<(), darkqa_ground::Error>(())
 /// ```
 #[must_use]
-pub fn read(reply: &str, choices: &Choices, mode: ReadingMode) -> Answer {
+pub fn read(reply: &str, choices: &Choices, mode: ParsingMode) -> Answer {
     let text = match clean::without_reasoning(reply) {
         Ok(text) => text,
         Err(reason) => return Answer::Unparsed(reason),
@@ -94,7 +94,7 @@ pub fn read(reply: &str, choices: &Choices, mode: ReadingMode) -> Answer {
         return strict::read(rest, choices.texts()).unwrap_or(unread);
     }
     match (mode, lenient::read(text, choices)) {
-        (ReadingMode::Strict, Answer::Chosen(_)) => Answer::Unparsed(UnreadReason::NoChoice),
+        (ParsingMode::Strict, Answer::Chosen(_)) => Answer::Unparsed(UnreadReason::NoChoice),
         (_, answer) => answer,
     }
 }
@@ -105,7 +105,7 @@ pub fn read(reply: &str, choices: &Choices, mode: ReadingMode) -> Answer {
 /// this order. A truncated explanation is not parsed leniently, because it could still have ended in another choice.
 #[must_use]
 pub fn readings(reply: &Reply, choices: &Choices) -> (Answer, Answer) {
-    let strict = read(&reply.text, choices, ReadingMode::Strict);
+    let strict = read(&reply.text, choices, ParsingMode::Strict);
     if let Answer::Chosen(_) = strict {
         return (strict, strict);
     }
@@ -114,7 +114,7 @@ pub fn readings(reply: &Reply, choices: &Choices) -> (Answer, Answer) {
         Finish::Filter => UnreadReason::Filtered,
         Finish::Length => UnreadReason::Truncated,
         Finish::Stop | Finish::Other(_) | Finish::Unknown => {
-            return (strict, read(&reply.text, choices, ReadingMode::Lenient));
+            return (strict, read(&reply.text, choices, ParsingMode::Lenient));
         }
     };
     (Answer::Unparsed(reason), Answer::Unparsed(reason))

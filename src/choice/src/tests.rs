@@ -9,7 +9,7 @@ mod words;
 use proptest::prelude::*;
 use serde::Deserialize;
 
-use super::{ReadingMode, read, readings};
+use super::{ParsingMode, read, readings};
 use darkqa_ground::types::questions::{Answer, Choices, UnreadReason};
 use darkqa_ground::types::replies::{Finish, Reply};
 
@@ -86,8 +86,8 @@ fn replies_of_the_table_are_parsed() {
     for line in include_str!("../../../tests/data/replies.jsonl").lines() {
         let case: Case = serde_json::from_str(line).unwrap();
         for (mode, want) in [
-            (ReadingMode::Strict, case.strict),
-            (ReadingMode::Lenient, case.lenient),
+            (ParsingMode::Strict, case.strict),
+            (ParsingMode::Lenient, case.lenient),
         ] {
             let found = read(&case.reply, &choices(&case.of), mode);
             if found != want.into() {
@@ -128,7 +128,7 @@ fn reasoning_blocks_are_ignored() {
                 Answer::Unparsed(UnreadReason::Truncated),
             ),
         ] {
-            for mode in ReadingMode::ALL {
+            for mode in ParsingMode::ALL {
                 assert_eq!(read(&reply, &rooms, mode), expected, "{reply:?}");
             }
         }
@@ -140,7 +140,7 @@ fn reasoning_blocks_are_ignored() {
 fn reasoning_without_marks_is_not_parsed() {
     let rooms = choices_of(&["kitchen", "bedroom", "bathroom"]);
     let reply = "thought\nThe image is dark. The answer is C at first sight, hmm.\nB";
-    for mode in ReadingMode::ALL {
+    for mode in ParsingMode::ALL {
         let unread = Answer::Unparsed(UnreadReason::Truncated);
         assert_eq!(read(reply, &rooms, mode), unread);
         assert_eq!(read("thought\n\nB", &rooms, mode), Answer::Chosen(1));
@@ -152,13 +152,13 @@ fn full_width_letters_are_read_strictly() {
     let rooms = choices_of(&["厨房", "卧室"]);
     for reply in ["（B）", "B、", "B．", "B：", "（B） 卧室", "B、卧室"] {
         assert_eq!(
-            read(reply, &rooms, ReadingMode::Strict),
+            read(reply, &rooms, ParsingMode::Strict),
             Answer::Chosen(1),
             "{reply}"
         );
     }
     let wrong = Answer::Unparsed(UnreadReason::Contradiction);
-    assert_eq!(read("（B）厨房", &rooms, ReadingMode::Strict), wrong);
+    assert_eq!(read("（B）厨房", &rooms, ParsingMode::Strict), wrong);
 }
 
 #[test]
@@ -231,7 +231,7 @@ fn long_replies_are_read() {
         "There is a stove. {}\nAnswer: B",
         "It is dim here. ".repeat(10_000)
     );
-    let found = read(&answered, &rooms, ReadingMode::Lenient);
+    let found = read(&answered, &rooms, ParsingMode::Lenient);
     assert_eq!(found, Answer::Chosen(1));
     // Repetitions of the strings that the parser searches for. A quadratic step would make this test very slow.
     for piece in [
@@ -259,7 +259,7 @@ fn long_replies_are_read() {
         "A bedroom. ",
     ] {
         let long = piece.repeat(20_000 / piece.len());
-        let _ = read(&long, &rooms, ReadingMode::Lenient);
+        let _ = read(&long, &rooms, ParsingMode::Lenient);
     }
 }
 
@@ -346,8 +346,8 @@ proptest! {
     #[test]
     fn the_modes_never_disagree(reply in reply(), set in 0..SETS.len()) {
         let choices = choices(SETS[set].0);
-        let strict = read(&reply, &choices, ReadingMode::Strict);
-        let lenient = read(&reply, &choices, ReadingMode::Lenient);
+        let strict = read(&reply, &choices, ParsingMode::Strict);
+        let lenient = read(&reply, &choices, ParsingMode::Lenient);
         match (strict, lenient) {
             (Answer::Chosen(strict), lenient) => {
                 prop_assert_eq!(lenient, Answer::Chosen(strict));
@@ -374,7 +374,7 @@ proptest! {
             6 => (format!("{{\"answer\": \"{text}\"}}"), false),
             _ => (format!("**{letter}. {text}**"), false),
         };
-        prop_assert_eq!(read(&reply, &choices, ReadingMode::Lenient), Answer::Chosen(index), "{}", reply);
-        prop_assert_eq!(read(&reply, &choices, ReadingMode::Strict) == Answer::Chosen(index), strict, "{}", reply);
+        prop_assert_eq!(read(&reply, &choices, ParsingMode::Lenient), Answer::Chosen(index), "{}", reply);
+        prop_assert_eq!(read(&reply, &choices, ParsingMode::Strict) == Answer::Chosen(index), strict, "{}", reply);
     }
 }

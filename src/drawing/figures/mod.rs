@@ -19,7 +19,7 @@ use crate::drawing::chart::{Chart, DarkMark, LineContent, LineItems, LineStyle, 
 use crate::text::words::{counted, family as family_name, light_with, names_enhancer};
 use crate::types::degradations::{Axis, Kind};
 use crate::types::{AxisLevel, EnhancerName, Family, Variant, View};
-use darkqa_score::choice::ReadingMode;
+use darkqa_score::choice::ParsingMode;
 use darkqa_score::estimate::Estimate;
 use darkqa_score::findings::Findings;
 use darkqa_score::model_in_condition::{CHANCE, ModelInCondition, pooled_models};
@@ -192,7 +192,7 @@ impl<'a> FigureBuilder<'a> {
         let cell = self
             .findings
             .summary
-            .cell(subject, family, ReadingMode::Strict)?;
+            .cell(subject, family, ParsingMode::Strict)?;
         cell.accuracy
     }
 
@@ -200,7 +200,7 @@ impl<'a> FigureBuilder<'a> {
     fn flat_lines(&self, family: Option<&Family>) -> Vec<PlotLine> {
         self.findings
             .summary
-            .family_cells(family, ReadingMode::Strict)
+            .family_cells(family, ParsingMode::Strict)
             .filter(|cell| cell.subject.view != Some(View::Image))
             .filter_map(|cell| {
                 let model = &*cell.subject.model;

@@ -5,7 +5,7 @@ use crate::drawing::chart::LineStyle;
 use crate::drawing::chart::bars::{Bar, BarChart, BarPanel};
 use crate::drawing::chart::figure_chart::FigureChart;
 use crate::types::{SetLight, View};
-use darkqa_score::choice::ReadingMode;
+use darkqa_score::choice::ParsingMode;
 
 impl FigureBuilder<'_> {
     /// Accuracy of each model on the photographs, raw and with each enhancer; `None` for data sets photographed in good light, which have
@@ -17,7 +17,7 @@ impl FigureBuilder<'_> {
         }
         let chance = findings
             .summary
-            .family_cells(None, ReadingMode::Strict)
+            .family_cells(None, ParsingMode::Strict)
             .filter(|cell| cell.subject.view.is_none())
             .find_map(|cell| Some(cell.accuracy?.value));
         let panels = self.models.iter().map(|model| BarPanel {

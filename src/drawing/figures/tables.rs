@@ -7,7 +7,7 @@ use crate::text::table::{Column, ColumnHeads, ColumnKind, Table, TableCell, Tabl
 use crate::text::words::family as family_name;
 use crate::types::degradations::{Axis, Kind};
 use crate::types::{AxisLevel, EnhancerName, Family, Variant, View};
-use darkqa_score::choice::ReadingMode;
+use darkqa_score::choice::ParsingMode;
 use darkqa_score::comparisons::PooledKind;
 use darkqa_score::estimate::Estimate;
 use darkqa_score::findings::Findings;
@@ -153,7 +153,7 @@ impl FigureBuilder<'_> {
     fn without_images(&self, columns: usize) -> impl Iterator<Item = TableRow> {
         self.findings
             .summary
-            .family_cells(None, ReadingMode::Strict)
+            .family_cells(None, ParsingMode::Strict)
             .filter(|cell| cell.subject.view != Some(View::Image))
             .filter_map(move |cell| {
                 let accuracy = cell.accuracy?;

@@ -4,7 +4,7 @@ use crate::drawing::chart::LineStyle;
 use crate::drawing::chart::bars::{Bar, BarChart, BarPanel};
 use crate::drawing::chart::figure_chart::FigureChart;
 use crate::drawing::figures::FigureSpec;
-use darkqa_score::choice::ReadingMode;
+use darkqa_score::choice::ParsingMode;
 use darkqa_score::comparisons::ComparisonKind;
 use darkqa_score::findings::Findings;
 use darkqa_score::model_in_condition::ModelInCondition;
@@ -15,7 +15,7 @@ use darkqa_score::photographs::pair_darkness::PairDarkness;
 pub(super) fn figure_spec(findings: &Findings<'_>) -> Option<FigureSpec> {
     let chance = findings
         .summary
-        .family_cells(None, ReadingMode::Strict)
+        .family_cells(None, ParsingMode::Strict)
         .filter(|cell| cell.subject.view.is_none())
         .find_map(|cell| Some(cell.accuracy?.value));
     let mut models: Vec<&str> = Vec::new();
@@ -76,7 +76,7 @@ fn bars(findings: &Findings<'_>, pair: &PairDarkness, model: &str) -> Vec<Bar> {
                 continue;
             }
             subjects.push(subject);
-            let cell = findings.summary.cell(subject, None, ReadingMode::Strict);
+            let cell = findings.summary.cell(subject, None, ParsingMode::Strict);
             if let Some(share) = cell.and_then(|cell| cell.accuracy) {
                 bars.push(Bar {
                     name: subject.condition(),

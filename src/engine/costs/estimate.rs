@@ -14,9 +14,9 @@ use crate::error::Result;
 use crate::images::frames::Source;
 use crate::images::image_pipeline::ImagePipeline;
 use crate::images::trials::{Item as _, Plan};
-use crate::report::forecast::{CostLine, FewSources, Forecast, ReadingCost, StoreForecast};
+use crate::report::forecast::{CostLine, FewSources, Forecast, ProfileCost, StoreForecast};
 use crate::store::StoredTrial;
-use crate::types::{Degradation, ImageFacts, ReadingName, View};
+use crate::types::{Degradation, ImageFacts, ProfileName, View};
 use darkqa_score::cluster::MIN_SCENES;
 
 /// Assumed latency of a reply in seconds, if no reply is stored.
@@ -164,7 +164,7 @@ fn cost_lines<E: Experiment>(
         .filter(|(_, model)| model.model.is_remote())
         .map(|(index, model)| {
             let price = model.price(&experiment.settings().money.prices);
-            let mut by_profile = BTreeMap::<Option<ReadingName>, Tokens>::new();
+            let mut by_profile = BTreeMap::<Option<ProfileName>, Tokens>::new();
             for (place, group) in plan.groups() {
                 let degradation = group.condition.as_ref().and_then(|c| c.degradation());
                 let profile = degradation.and_then(Degradation::reading).cloned();
@@ -276,7 +276,7 @@ impl Tokens {
 fn cost_line(
     model: &ModelUnderTest,
     price: Option<Price>,
-    by_profile: &BTreeMap<Option<ReadingName>, Tokens>,
+    by_profile: &BTreeMap<Option<ProfileName>, Tokens>,
     phase: &str,
 ) -> CostLine {
     let tokens = Tokens::sum(by_profile.values());
@@ -302,7 +302,7 @@ fn cost_line(
         readings: by_profile
             .iter()
             .filter(|(_, tokens)| tokens.requests > 0)
-            .map(|(profile, tokens)| ReadingCost {
+            .map(|(profile, tokens)| ProfileCost {
                 reading: profile.clone(),
                 requests: tokens.requests,
                 dollars: tokens.dollars(price, tokens.reply),

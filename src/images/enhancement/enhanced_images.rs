@@ -13,7 +13,7 @@ use crate::images::frames::SourceFrame;
 use crate::images::recipes::ImageRecipe;
 use crate::images::stored::{Sidecar, differing_fields};
 use crate::picture::image_file::format::FileFormat;
-use crate::picture::{ImageFile, ReadingRule};
+use crate::picture::{DecodeRule, ImageFile};
 use crate::text::words::first_names;
 use crate::types::{Condition, DepthNote, Digest, EnhancerName, FrameId, Rgb};
 use darkqa_enhance::{EnhancedFolder, ImageUse, Implausible, Usage};
@@ -154,7 +154,7 @@ impl EnhancedImages {
         implausible: Implausible,
     ) -> Result<(Rgb, ImageUse)> {
         let place = self.folder.join(path(frame, condition)?);
-        let file = ImageFile::open(&place, ReadingRule::default())?;
+        let file = ImageFile::open(&place, DecodeRule::default())?;
         if Digest::from_bytes(file.bytes()) != self.image_digest(frame, condition)? {
             let problem = "was changed during the run; restore it, or start a new run";
             return Err(Error::data(place.display(), problem));
@@ -283,7 +283,7 @@ impl EnhancedImages {
 
 impl EnhancedFile {
     fn open(path: &Path) -> Result<Self> {
-        let file = ImageFile::open(path, ReadingRule::default())?;
+        let file = ImageFile::open(path, DecodeRule::default())?;
         Ok(Self {
             digest: Digest::from_bytes(file.bytes()),
             size: png_size(&file),

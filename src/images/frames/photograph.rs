@@ -2,7 +2,7 @@
 
 use crate::types::degradations::Kind;
 use crate::types::{
-    Degradation, Digest, InputNote, PairFacts, PhotoName, ReadingName, Rgb, Severity,
+    Degradation, Digest, InputNote, PairFacts, PhotoName, ProfileName, Rgb, Severity,
 };
 use darkqa_light::PairEv;
 
@@ -39,7 +39,7 @@ impl SourcePhotograph {
 pub(crate) fn matching_degradation(
     photos: &[SourcePhotograph],
     kind: Kind,
-    reading: Option<&ReadingName>,
+    reading: Option<&ProfileName>,
 ) -> Option<(Degradation, PairFacts)> {
     let facts = photos.first()?.facts?;
     let hundredths = (100.0 * facts.matching()?).round();

@@ -14,7 +14,7 @@ use crate::error::Result;
 use crate::images::frames::source::{Frames, Source, SourceFrame};
 use crate::images::progress::Progress;
 use crate::picture::Scaling;
-use crate::picture::{ImageFile, ReadingRule};
+use crate::picture::{DecodeRule, ImageFile};
 use crate::types::{Decides, FrameId};
 
 /// Flags that decide which frames of a walk are shown, and how.
@@ -74,7 +74,7 @@ fn longer_side(text: &str) -> Result<Scaling, String> {
 #[derive(Debug)]
 pub(crate) struct WalkFolder {
     folder: PathBuf,
-    rule: ReadingRule,
+    rule: DecodeRule,
 }
 
 impl Frames for WalkFolder {
@@ -90,7 +90,7 @@ impl Frames for WalkFolder {
 }
 
 impl WalkFolder {
-    pub(crate) fn new(walk: &WalkArgs, rule: ReadingRule) -> Self {
+    pub(crate) fn new(walk: &WalkArgs, rule: DecodeRule) -> Self {
         Self {
             folder: walk.folder.clone(),
             rule,

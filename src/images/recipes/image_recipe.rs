@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::images::stored::{ImageOrigin, Sidecar, differing_fields};
 use crate::types::degradations::{Axis, Kind};
 use crate::types::{
-    Condition, Degradation, Digest, ExposureFacts, FrameId, InputNote, ReadingName, Rgb,
+    Condition, Degradation, Digest, ExposureFacts, FrameId, InputNote, ProfileName, Rgb,
 };
 use darkqa_light::movement::blur::{blur, blurred_codes};
 use darkqa_light::{
@@ -44,7 +44,7 @@ struct SensorRecord {
     seed: u64,
     /// The noise profile, as defined by the fields below.
     #[serde(default = "paper")]
-    reading: ReadingName,
+    reading: ProfileName,
     amplify: Amplify,
     tone: Tone,
     draws: Draws,
@@ -247,8 +247,8 @@ impl ImageRecipe {
 }
 
 /// Default noise profile of files without this field.
-fn paper() -> ReadingName {
-    ReadingName::PAPER
+fn paper() -> ProfileName {
+    ProfileName::PAPER
 }
 
 /// Version of the code that makes a degradation; for a clean frame, that of the exposure drop.

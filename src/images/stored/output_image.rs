@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 use crate::error::{Error, Result};
 use crate::files::{reading, write};
 use crate::picture::png;
-use crate::picture::{ImageFile, ReadingRule};
+use crate::picture::{DecodeRule, ImageFile};
 use crate::types::{Digest, Rgb};
 
 /// The origin of an image, as written in its JSON sidecar.
@@ -337,9 +337,9 @@ pub(crate) fn differing_fields(one: &Value, other: &Value) -> Vec<String> {
 
 /// The pixels of an image file; `None` if it cannot be decoded.
 fn decode(path: &Path, bytes: &[u8]) -> Option<Rgb> {
-    let rule = ReadingRule {
+    let rule = DecodeRule {
         max_pixels: u64::MAX / 8,
-        ..ReadingRule::default()
+        ..DecodeRule::default()
     };
     let file = ImageFile::new(bytes.to_vec(), path.display().to_string(), rule);
     file.decode().ok()

@@ -14,7 +14,7 @@ use crate::error::{Error, Result};
 use crate::files::reading;
 use crate::images::progress::Progress;
 use crate::images::trials::questions_by_rule::generate_by_rule;
-use crate::picture::ReadingRule;
+use crate::picture::DecodeRule;
 use crate::text::words::counted;
 use crate::types::{Digest, Family, FrameId, Question};
 use darkqa_questions::rules::Rules;
@@ -37,7 +37,7 @@ pub(crate) fn open_data(
     set: &SetArgs,
     selection: &SelectionArgs,
     rules: &Rules,
-    rule: ReadingRule,
+    rule: DecodeRule,
     progress: &Progress,
 ) -> Result<Dataset> {
     let dataset = open_without_generating(place, scene, set, selection, rule)?;
@@ -83,7 +83,7 @@ pub(crate) fn open_without_generating(
     scene: &SceneArgs,
     set: &SetArgs,
     selection: &SelectionArgs,
-    rule: ReadingRule,
+    rule: DecodeRule,
 ) -> Result<Dataset> {
     let dataset = scene.open(place, selection.questions.as_deref(), set)?;
     Ok(dataset.with_rule(rule))
@@ -149,7 +149,7 @@ impl QuestionBank {
         &self,
         place: &DataPlace,
         set: &SetArgs,
-        rule: ReadingRule,
+        rule: DecodeRule,
         progress: &Progress,
     ) -> Result<Dataset> {
         let found = Photographs::open(place, set)?;

@@ -9,7 +9,7 @@ use std::thread::{self, JoinHandle};
 
 use super::Nanoseconds;
 use crate::error::{Error, Result};
-use crate::picture::reading_rule::MAX_PIXELS;
+use crate::picture::decode_rule::MAX_PIXELS;
 use crate::types::Rgb;
 use crate::types::text::excerpt;
 

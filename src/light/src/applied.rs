@@ -6,7 +6,7 @@ use super::movement::{FrameView, Motion, Streak};
 use super::noise_profile::Synthesis;
 use darkqa_ground::error::Result;
 use darkqa_ground::types::degradations::Kind;
-use darkqa_ground::types::{Degradation, ExposureFacts, ReadingName, Severity};
+use darkqa_ground::types::{Degradation, ExposureFacts, ProfileName, Severity};
 
 /// A degradation with all parameters for one frame. Together with the frame and its noise key, they decide the pixels.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,7 +18,7 @@ pub enum AppliedDegradation {
         /// Exposure drop.
         severity: Severity,
         /// Name of the noise profile.
-        reading: ReadingName,
+        reading: ProfileName,
         /// Content of the noise profile.
         synthesis: Synthesis,
     },
@@ -58,7 +58,7 @@ impl AppliedDegradation {
             Kind::Exposure => Self::Exposure(severity),
             Kind::Sensor => Self::Sensor {
                 severity,
-                reading: how.reading().cloned().unwrap_or(ReadingName::PAPER),
+                reading: how.reading().cloned().unwrap_or(ProfileName::PAPER),
                 synthesis: synthesis.clone(),
             },
             Kind::Auto => {

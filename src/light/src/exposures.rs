@@ -10,12 +10,12 @@ use super::movement::Streak;
 use super::movement::blur::{self, blur, blurred_codes};
 use super::raw::negative::{Negative, develop_by};
 use darkqa_ground::types::degradations::Kind;
-use darkqa_ground::types::{Light, ReadingName, Rgb};
+use darkqa_ground::types::{Light, ProfileName, Rgb};
 
 /// Makes degraded images of one frame. Caches one [`Negative`] per noise profile, and the last blurred frame.
 #[derive(Debug, Default)]
 pub struct Exposures {
-    negatives: BTreeMap<ReadingName, Negative>,
+    negatives: BTreeMap<ProfileName, Negative>,
     /// Blurred light of the last path; levels with equal exposure time share it.
     blurred: Option<(Streak, Light)>,
 }

@@ -70,7 +70,7 @@ impl Levels {
         }
         let mut all = Vec::new();
         for kind in kinds.kinds().filter(|kind| kind.can_match()) {
-            if kind.has_readings() {
+            if kind.has_profiles() {
                 let readings = readings.iter().map(|(name, _)| Some(name.clone()));
                 all.extend(readings.map(|reading| PairDark::Match(kind, reading)));
             } else {

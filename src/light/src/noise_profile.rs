@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::camera::CameraModel;
 use darkqa_ground::error::{Error, Result};
-use darkqa_ground::types::{Degradation, ReadingName};
+use darkqa_ground::types::{Degradation, ProfileName};
 
 /// Choices that define the sensor branch. The default follows the paper; `src/docs/method.md` documents the choices that the paper leaves
 /// open, with their effects.
@@ -46,12 +46,12 @@ impl NoiseProfile {
 
     /// Name in conditions, such as `eld` in `L3-noise@eld`.
     #[must_use]
-    pub fn name(self) -> ReadingName {
+    pub fn name(self) -> ProfileName {
         match self {
-            Self::Paper => ReadingName::PAPER,
-            Self::Eld => ReadingName::from_static("eld"),
-            Self::Level => ReadingName::from_static("level"),
-            Self::Physical => ReadingName::from_static("physical"),
+            Self::Paper => ProfileName::PAPER,
+            Self::Eld => ProfileName::from_static("eld"),
+            Self::Level => ProfileName::from_static("level"),
+            Self::Physical => ProfileName::from_static("physical"),
         }
     }
 }
@@ -77,18 +77,18 @@ impl Synthesis {
 
     /// Name of the profile with these choices, for any camera; `custom` if there is none.
     #[must_use]
-    pub fn name(&self) -> ReadingName {
+    pub fn name(&self) -> ProfileName {
         NoiseProfile::ALL
             .into_iter()
             .find(|reading| Self::new(*reading, self.camera.clone()) == *self)
-            .map_or(ReadingName::CUSTOM, NoiseProfile::name)
+            .map_or(ProfileName::CUSTOM, NoiseProfile::name)
     }
 }
 
 /// Noise profiles of a run by name; at least one.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(transparent)]
-pub struct NoiseProfiles(BTreeMap<ReadingName, Synthesis>);
+pub struct NoiseProfiles(BTreeMap<ProfileName, Synthesis>);
 
 impl Default for NoiseProfiles {
     fn default() -> Self {
@@ -117,7 +117,7 @@ impl NoiseProfiles {
     }
 
     /// Names and choices of the profiles, `paper` first.
-    pub fn iter(&self) -> impl Iterator<Item = (&ReadingName, &Synthesis)> {
+    pub fn iter(&self) -> impl Iterator<Item = (&ProfileName, &Synthesis)> {
         self.0.iter()
     }
 
@@ -140,7 +140,7 @@ impl NoiseProfiles {
             Some(name) => self.get(name),
         };
         synthesis.ok_or_else(|| {
-            let names: Vec<&str> = self.0.keys().map(ReadingName::as_str).collect();
+            let names: Vec<&str> = self.0.keys().map(ProfileName::as_str).collect();
             let problem = format_args!(
                 "{} needs a noise profile that is not among those of --profile ({}); add it there",
                 degradation.map_or("L0".to_owned(), ToString::to_string),
@@ -151,7 +151,7 @@ impl NoiseProfiles {
     }
 
     /// The choices of the profile of this name; `None` if the run does not have it.
-    pub fn get(&self, name: &ReadingName) -> Option<&Synthesis> {
+    pub fn get(&self, name: &ProfileName) -> Option<&Synthesis> {
         self.0.get(name)
     }
 
@@ -274,7 +274,7 @@ mod tests {
                 draws: Draws::Fresh,
                 ..synthesis
             };
-            assert_eq!(fresh.name(), ReadingName::CUSTOM);
+            assert_eq!(fresh.name(), ProfileName::CUSTOM);
         }
     }
 

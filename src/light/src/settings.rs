@@ -16,7 +16,7 @@ use super::{CameraModel, Sampling};
 use darkqa_ground::error::{Error, Result};
 use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{
-    AxisLevel, Decides, Degradation, KindSet, PairDark, ReadingName, SetLight,
+    AxisLevel, Decides, Degradation, KindSet, PairDark, ProfileName, SetLight,
 };
 
 /// The levels and kinds of degradation.
@@ -232,7 +232,7 @@ impl LightSettings {
             };
             let kinds = self.variants.kinds();
             for kind in kinds.filter(|kind| AxisLevel::new(*kind, severity) == *level) {
-                let readings: Vec<Option<ReadingName>> = if kind.has_readings() {
+                let readings: Vec<Option<ProfileName>> = if kind.has_profiles() {
                     self.kinds
                         .sensor
                         .readings

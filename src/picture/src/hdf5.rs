@@ -6,8 +6,8 @@
 
 use std::io::Read as _;
 
+use crate::decode_rule::MAX_PIXELS;
 use crate::npy::Npy;
-use crate::reading_rule::MAX_PIXELS;
 
 /// The first eight bytes of every HDF5 file.
 const SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";

@@ -22,7 +22,7 @@ use self::exr_layers::ExrFile;
 use self::facts::{Depth, FileFacts, InkForm, fault};
 use self::format::FileFormat;
 use super::colour::{CodeDepth, ColourSpace, ColourTag, Inks, Meaning};
-use super::reading_rule::{ColourRule, ReadingRule, Transfer};
+use super::decode_rule::{ColourRule, DecodeRule, Transfer};
 use darkqa_ground::error::{Error, Result};
 use darkqa_ground::files::guarded::guarded;
 use darkqa_ground::files::reading;
@@ -35,7 +35,7 @@ use darkqa_ground::types::{
 pub struct ImageFile {
     bytes: Vec<u8>,
     place: String,
-    rule: ReadingRule,
+    rule: DecodeRule,
     orientation_use: OrientationUse,
     /// Facts from the headers, read on first use.
     facts: OnceLock<FileFacts>,
@@ -62,7 +62,7 @@ pub struct StatedOrientation {
 impl ImageFile {
     /// An image file with these bytes. `place` is its path, and line if any, for messages.
     #[must_use]
-    pub fn new(bytes: Vec<u8>, place: String, rule: ReadingRule) -> Self {
+    pub fn new(bytes: Vec<u8>, place: String, rule: DecodeRule) -> Self {
         Self {
             bytes,
             place,
@@ -76,7 +76,7 @@ impl ImageFile {
     ///
     /// # Errors
     /// If it cannot be read.
-    pub fn open(path: &Path, rule: ReadingRule) -> Result<Self> {
+    pub fn open(path: &Path, rule: DecodeRule) -> Result<Self> {
         let bytes = reading::bytes(path)?;
         Ok(Self::new(bytes, path.display().to_string(), rule))
     }
@@ -192,7 +192,7 @@ impl ImageFile {
     /// # Errors
     /// If the colour space is not supported, or the file and the rule contradict each other.
     fn interpretation(&self, facts: &FileFacts) -> Result<Interpretation, String> {
-        let ReadingRule {
+        let DecodeRule {
             colour, transfer, ..
         } = self.rule;
         if facts.inks.is_some() {

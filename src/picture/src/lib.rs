@@ -12,6 +12,7 @@
 
 mod bilinear;
 mod colour;
+pub mod decode_rule;
 mod encoding;
 mod fitting;
 pub mod hdf5;
@@ -22,14 +23,13 @@ mod payload_format;
 mod plain_png;
 pub mod raw_image;
 pub mod raw_png;
-pub mod reading_rule;
 mod scaling;
 
 pub use bilinear::bilinear;
+pub use decode_rule::DecodeRule;
 pub use encoding::{exr, grey_png, png};
 pub use fitting::{fit, fitted_size};
 pub use image_file::ImageFile;
 pub use payload::{Payload, decode_data_url};
 pub use payload_format::{ImageArgs, PayloadFormat, Quality};
-pub use reading_rule::ReadingRule;
 pub use scaling::Scaling;

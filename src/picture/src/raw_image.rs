@@ -10,8 +10,8 @@ use darkqa_ground::types::{Image, Rgb, Rgb16Image};
 
 use self::layout::{Depth, Layout, Order};
 use self::mosaic::{RawSample, demosaic};
+use super::decode_rule::MAX_PIXELS;
 use super::encoding::{png, png_16};
-use super::reading_rule::MAX_PIXELS;
 
 /// Uncompressed image of a camera driver. Encodings have the names of ROS (`sensor_msgs/image_encodings.hpp`).
 #[derive(Debug, Clone)]

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use darkqa_ground::types::degradations::{Axis, Kind};
-use darkqa_ground::types::{Degradation, FrameId, ReadingName, Severity};
+use darkqa_ground::types::{Degradation, FrameId, ProfileName, Severity};
 use darkqa_light::{
     AppliedDegradation, AutoExposure, AutoSettings, CameraModel, CaptureState, FrameView, Motion,
     NoiseKey, NoiseProfile, Streak, Synthesis,
@@ -72,7 +72,7 @@ impl Settings {
                     .find(|reading| reading.name().as_str() == word)
                     .ok_or_else(|| {
                         let names = NoiseProfile::ALL.map(NoiseProfile::name);
-                        one_of("profile", &word, &names.each_ref().map(ReadingName::as_str))
+                        one_of("profile", &word, &names.each_ref().map(ProfileName::as_str))
                     })?
             }
         };
@@ -225,7 +225,7 @@ impl Settings {
         width: usize,
         key: &NoiseKey,
     ) -> PyResult<AppliedDegradation> {
-        let reading = self.kind.has_readings().then(|| self.synthesis.name());
+        let reading = self.kind.has_profiles().then(|| self.synthesis.name());
         let view = FrameView { width, focal: None };
         let motion = Motion::default();
         Degradation::new(self.kind, severity, reading)

@@ -13,7 +13,7 @@ use crate::text::outcome_words;
 use crate::text::words::family;
 use crate::types::{AxisLevel, FailureKind, QuestionId, RunQuestion, TrialRef, UnreadReason, View};
 use darkqa_score::answers::confusion;
-use darkqa_score::choice::ReadingMode;
+use darkqa_score::choice::ParsingMode;
 use darkqa_score::grid::{Grid, TrialResult};
 
 /// Packs the data of the script as compressed JSON in base64.
@@ -91,8 +91,8 @@ fn data<'a>(
         questions,
         choices: choices.list,
         items,
-        strict: codes(grid, ReadingMode::Strict),
-        lenient: codes(grid, ReadingMode::Lenient),
+        strict: codes(grid, ParsingMode::Strict),
+        lenient: codes(grid, ParsingMode::Lenient),
         reasons,
         why,
         texts: shortened(&replies.texts(), limit.text),
@@ -115,7 +115,7 @@ fn questions(grid: &Grid<'_>, inputs: &PageInputs<'_>) -> Result<RunQuestions> {
 }
 
 /// Result codes with a row for each subject and a column for each item.
-fn codes(grid: &Grid<'_>, mode: ReadingMode) -> Vec<Vec<u8>> {
+fn codes(grid: &Grid<'_>, mode: ParsingMode) -> Vec<Vec<u8>> {
     (0..grid.subjects.len())
         .map(|subject| {
             (0..grid.items.len())
@@ -125,7 +125,7 @@ fn codes(grid: &Grid<'_>, mode: ReadingMode) -> Vec<Vec<u8>> {
         .collect()
 }
 
-fn code(result: TrialResult, mode: ReadingMode) -> u8 {
+fn code(result: TrialResult, mode: ParsingMode) -> u8 {
     match result {
         TrialResult::Absent => ABSENT,
         TrialResult::Failed => FAILED,

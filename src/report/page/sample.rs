@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::types::{AxisLevel, Digest, Family};
-use darkqa_score::choice::ReadingMode;
+use darkqa_score::choice::ParsingMode;
 use darkqa_score::grid::Grid;
 use darkqa_score::model_in_condition::ModelInCondition;
 
@@ -118,6 +118,6 @@ fn answer_changes(grid: &Grid<'_>) -> Vec<AnswerChange> {
 
 /// True if a reply is right by strict parsing; `None` without a reply.
 fn is_right(grid: &Grid<'_>, subject: usize, item: usize) -> Option<bool> {
-    let answer = grid.result(subject, item).reading(ReadingMode::Strict)?;
+    let answer = grid.result(subject, item).reading(ParsingMode::Strict)?;
     Some(grid.items[item].is_right(answer))
 }

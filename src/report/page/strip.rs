@@ -8,7 +8,7 @@ use super::inputs::PageInputs;
 use crate::error::Result;
 use crate::text::words::light;
 use crate::types::{Axis, AxisLevel, EnhancerName, FrameId, Thumbnail, Variant};
-use darkqa_score::choice::ReadingMode;
+use darkqa_score::choice::ParsingMode;
 use darkqa_score::grid::{Grid, TrialResult};
 use darkqa_score::model_in_condition::{ModelInCondition, pooled_models};
 
@@ -259,7 +259,7 @@ impl StripTrial<'_> {
     /// with an enhancer.
     fn is_right(self) -> Option<bool> {
         let enhancer = self.row.enhancer.filter(|_| self.level != AxisLevel::L0);
-        let reading = self.result(enhancer)?.reading(ReadingMode::Strict)?;
+        let reading = self.result(enhancer)?.reading(ParsingMode::Strict)?;
         let item = &self.grid.items[self.item];
         item.asked.truth?;
         Some(item.is_right(reading))
@@ -272,7 +272,7 @@ impl StripTrial<'_> {
             return None;
         }
         let item = &self.grid.items[self.item];
-        let (class, sign, text) = match result.reading(ReadingMode::Strict) {
+        let (class, sign, text) = match result.reading(ParsingMode::Strict) {
             None => ("none", '–', "no reply"),
             Some(None) => ("none", '?', "not readable"),
             Some(Some(chosen)) => {

@@ -12,7 +12,7 @@ use crate::text::table::{Table, TableBuilder, TableCell, TableFormat};
 use crate::text::words::{counted, light};
 use crate::types::RunGroup;
 use darkqa_score::answers::confusion::{Confusion, Hallucination};
-use darkqa_score::choice::ReadingMode;
+use darkqa_score::choice::ParsingMode;
 use darkqa_score::comparisons::self_agreement::SelfAgreement;
 use darkqa_score::comparisons::self_agreement::cell::{AgreementCell, CellRole};
 use darkqa_score::comparisons::self_agreement::evidence::NoHalf;
@@ -67,10 +67,10 @@ pub(super) fn summary(found: &SelfAgreement<'_>) -> Table {
     builder.column(Text, "csv measure", |_| AGREEMENT).build()
 }
 
-fn mode(mode: ReadingMode) -> &'static str {
+fn mode(mode: ParsingMode) -> &'static str {
     match mode {
-        ReadingMode::Strict => "strict",
-        ReadingMode::Lenient => "lenient",
+        ParsingMode::Strict => "strict",
+        ParsingMode::Lenient => "lenient",
     }
 }
 

@@ -8,7 +8,7 @@ use crate::text::words::{percent, with_interval};
 use crate::text::wrapped::wrapped;
 use crate::types::replies::OBSERVER;
 use darkqa_score::accuracies::AccuracyCell;
-use darkqa_score::choice::ReadingMode;
+use darkqa_score::choice::ParsingMode;
 use darkqa_score::model_in_condition::{CHANCE, is_observer, without_run};
 
 /// Mark of an accuracy that is detected to be below the accuracy without images.
@@ -45,7 +45,7 @@ pub(super) fn baselines(report: &ChoiceReport<'_>, ladder: &Ladder<'_, AccuracyC
     let has_mark = report
         .findings
         .summary
-        .family_cells(None, ReadingMode::Strict)
+        .family_cells(None, ParsingMode::Strict)
         .filter(|cell| cell.subject.level.is_some())
         .any(|cell| !report.findings.below_blind(&cell.subject, None).is_empty());
     if has_mark {

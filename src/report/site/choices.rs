@@ -8,7 +8,7 @@ use crate::text::table::{ColumnKind, Table, TableBuilder, TableCell};
 use crate::text::words::points;
 use crate::types::{AxisLevel, Variant, View};
 use darkqa_score::accuracies::Curve;
-use darkqa_score::choice::ReadingMode;
+use darkqa_score::choice::ParsingMode;
 use darkqa_score::comparisons::{Comparison, ComparisonKind, RankRange};
 use darkqa_score::estimate::Estimate;
 use darkqa_score::findings::Findings;
@@ -101,7 +101,7 @@ fn row(findings: &Findings<'_>, variant: &Variant, model: &str, run: &RunLink) -
     let clean = ModelInCondition::with_images(model, AxisLevel::L0, variant, None);
     let clean = grid.find_up_to_group(&clean).and_then(|index| {
         let summary = &findings.summary;
-        let cell = summary.cell(&grid.subjects[index], None, ReadingMode::Strict)?;
+        let cell = summary.cell(&grid.subjects[index], None, ParsingMode::Strict)?;
         cell.accuracy
     });
     let curve: Option<&Curve> = findings.curves.iter().find(|curve| {

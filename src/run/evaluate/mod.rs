@@ -31,7 +31,7 @@ pub(crate) use write_plan::plan;
 pub(crate) fn evaluate(args: EvaluateArgs, progress: &Progress) -> Result<Outcome> {
     let config = args.resolve()?;
     let (setup, files) = ChoiceSetup::open(&config, progress)?;
-    setup.print_reading(progress);
+    setup.print_column_mapping(progress);
     Job::new(&setup, files, progress)?.run()
 }
 
@@ -54,7 +54,7 @@ pub(crate) fn export_batch(
 ) -> Result<Outcome> {
     let config = args.resolve()?;
     let (setup, models) = ChoiceSetup::open(&config, progress)?;
-    setup.print_reading(progress);
+    setup.print_column_mapping(progress);
     Job::new(&setup, models, progress)?.export_batch(files)
 }
 
@@ -70,6 +70,6 @@ pub(crate) fn run_batch(
 ) -> Result<Outcome> {
     let config = args.resolve()?;
     let (setup, models) = ChoiceSetup::open(&config, progress)?;
-    setup.print_reading(progress);
+    setup.print_column_mapping(progress);
     Job::new(&setup, models, progress)?.run_batch(files, batch)
 }

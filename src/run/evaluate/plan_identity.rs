@@ -8,7 +8,7 @@ use crate::engine::identity;
 use crate::error::Result;
 use crate::images::recipes::Recipe;
 use crate::images::trials::questions::ASK;
-use crate::picture::ReadingRule;
+use crate::picture::DecodeRule;
 use crate::types::manifests::Identity;
 use crate::types::{AxisLevel, Family, SetLight};
 use darkqa_questions::rules::Rules;
@@ -24,7 +24,7 @@ pub(super) fn plan_identity(config: &Evaluation, dataset: &Dataset) -> Result<Id
     let is_own = Rules::built_in().is_ok_and(|built_in| built_in.digest() != rules);
     let families: Vec<&str> = selection.families.iter().map(Family::name).collect();
     let bank = config.bank.as_ref();
-    let usual = ReadingRule::default();
+    let usual = DecodeRule::default();
     let job = &config.job;
     let levels: Vec<String> = job.light.levels.iter().map(AxisLevel::to_string).collect();
     let fields = [

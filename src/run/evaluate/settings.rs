@@ -14,7 +14,7 @@ use crate::engine::models::{ModelName, TextBaseline};
 use crate::engine::settings::{ExperimentSettings, JobArgs, JobSettings};
 use crate::error::{Error, Result};
 use crate::images::trials::questions::{QuestionBank, rules};
-use crate::picture::ReadingRule;
+use crate::picture::DecodeRule;
 use crate::runs::run_plan::RunPlan;
 use crate::types::{Decides, SetLight, Truths, View};
 use darkqa_questions::rules::Rules;
@@ -98,7 +98,7 @@ pub(super) struct Evaluation {
     pub(super) scene: SceneArgs,
     pub(super) selection: SelectionArgs,
     /// Rule for decoding images.
-    pub(super) rule: ReadingRule,
+    pub(super) rule: DecodeRule,
     /// Questions asked about every image, with the number per image; `None` if the data set has its own questions with answers.
     pub(super) bank: Option<QuestionBank>,
     pub(super) order: ChoiceOrder,

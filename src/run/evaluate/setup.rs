@@ -163,7 +163,7 @@ impl<'a> ChoiceSetup<'a> {
     }
 
     /// Prints the inferred column mapping of a ready-made set, and warns about unnamed scenes.
-    pub(super) fn print_reading(&self, progress: &Progress) {
+    pub(super) fn print_column_mapping(&self, progress: &Progress) {
         for line in self.dataset.printed_summary() {
             progress.note(line);
         }

@@ -32,7 +32,7 @@ pub(crate) fn plan(mut args: EvaluateArgs, progress: &Progress) -> Result<Outcom
     // A new plan is made from the data, not from an existing plan.
     config.plan = None;
     let (setup, files) = ChoiceSetup::open(&config, progress)?;
-    setup.print_reading(progress);
+    setup.print_column_mapping(progress);
     let trials = setup.plan(0, || Ok(Vec::new()))?;
     let costs = costs(&setup, &trials);
     let frames = setup.sources.iter().zip(costs).zip(0..);

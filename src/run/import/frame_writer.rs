@@ -15,8 +15,8 @@ use crate::import::recording::{
     Channel, ChannelContent, ImageMessage, MessageImage, Nanoseconds, Place, Thumbnail, seconds,
 };
 use crate::picture::ImageFile;
+use crate::picture::decode_rule::DecodeRule;
 use crate::picture::raw_image::RawPixels;
-use crate::picture::reading_rule::ReadingRule;
 use crate::text::words::counted;
 use crate::types::text::excerpt;
 use crate::types::{FrameId, Labels, Rgb};
@@ -248,8 +248,7 @@ impl<'a> FrameWriter<'a> {
                 })
             }
             MessageImage::File { format, bytes } => {
-                let file =
-                    ImageFile::new(bytes.into_owned(), frame.words(), ReadingRule::default());
+                let file = ImageFile::new(bytes.into_owned(), frame.words(), DecodeRule::default());
                 let ending = file.extension();
                 if !COPIED.contains(&ending) {
                     return Err(format!(
@@ -341,7 +340,7 @@ pub(super) fn thumbnail(channel: &Channel, bytes: &[u8], white: u16) -> Result<T
             }
         },
         MessageImage::File { bytes, .. } => {
-            let file = ImageFile::new(bytes.into_owned(), String::new(), ReadingRule::default());
+            let file = ImageFile::new(bytes.into_owned(), String::new(), DecodeRule::default());
             file.decode()
                 .map(|image| Thumbnail::new(&image))
                 .map_err(|e| e.to_string())

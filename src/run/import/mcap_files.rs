@@ -9,7 +9,7 @@ use crate::files::reading::{entries, open};
 use crate::images::progress::Progress;
 use crate::import::recording::{COMPRESSED_FILE, McapReader, Overview, SQLITE_BAG};
 use crate::picture::ImageFile;
-use crate::picture::reading_rule::ReadingRule;
+use crate::picture::decode_rule::DecodeRule;
 
 /// Replaces folders by the MCAP files in them, in the order of their numbers.
 pub(super) fn files(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
@@ -95,7 +95,7 @@ pub(super) fn overview(files: &[PathBuf], progress: &Progress) -> Result<Overvie
 /// Width and height of an image file in a message.
 fn image_size(bytes: &[u8]) -> Result<(u32, u32), String> {
     let name = "the first image".to_owned();
-    let file = ImageFile::new(bytes.to_vec(), name, ReadingRule::default());
+    let file = ImageFile::new(bytes.to_vec(), name, DecodeRule::default());
     let ending = file.extension();
     if !COPIED.contains(&ending) {
         return Err(format!("a file .{ending}; JPEG, PNG or WebP expected"));

@@ -13,7 +13,7 @@ use crate::engine::models::ModelName;
 use crate::engine::settings::{ExperimentSettings, JobArgs, JobSettings};
 use crate::error::{Error, Result};
 use crate::images::frames::WalkArgs;
-use crate::picture::ReadingRule;
+use crate::picture::DecodeRule;
 use crate::types::Decides;
 use darkqa_score::choice::llm_match::Protocol;
 
@@ -89,7 +89,7 @@ pub(super) struct OpenEqa {
     pub(super) chosen: OpenSelectionArgs,
     pub(super) walk: WalkArgs,
     /// Rule for decoding images.
-    pub(super) rule: ReadingRule,
+    pub(super) rule: DecodeRule,
     pub(super) answers: Vec<AnswersFile>,
     /// `None` if the answers are not marked.
     pub(super) judge: Option<Judge>,

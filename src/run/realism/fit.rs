@@ -4,7 +4,7 @@ use super::check::{CheckedPair, load};
 use super::settings::RealismArgs;
 use super::workers::PairWorkers;
 use crate::error::Result;
-use crate::types::{FrameId, Pixels, ReadingName, Rgb};
+use crate::types::{FrameId, Pixels, ProfileName, Rgb};
 use darkqa_light::{
     CameraModel, CameraState, CleanRaw, Coupling, NoiseKey, Sampling, SensorSettings, Synthesis,
 };
@@ -54,12 +54,12 @@ pub(super) fn fit(
 
 /// A noise profile with a camera at the middle of its ranges, for each gain of the ladder.
 struct ProfileLadder {
-    name: ReadingName,
+    name: ProfileName,
     ladder: [Synthesis; LADDER_STEPS],
 }
 
 impl ProfileLadder {
-    fn new(name: &ReadingName, synthesis: &Synthesis) -> Result<Self> {
+    fn new(name: &ProfileName, synthesis: &Synthesis) -> Result<Self> {
         let mut camera = synthesis.camera.clone();
         camera.set_sampling(Sampling::Fixed);
         camera.set_gain_range(GAINS)?;

@@ -8,7 +8,7 @@ use hyper::StatusCode;
 use serde::Deserialize;
 
 use super::completion::{ReplyForm, RequestFault};
-use crate::picture::{ImageFile, ReadingRule};
+use crate::picture::{DecodeRule, ImageFile};
 use crate::picture::{Payload, PayloadFormat};
 use crate::types::Rgb;
 
@@ -125,7 +125,7 @@ fn decode_data_url(url: &str) -> Result<(Rgb, Arc<Payload>), RequestFault> {
     let bytes = STANDARD
         .decode(data)
         .map_err(|e| invalid_image(format!("the image is not base64: {e}")))?;
-    let file = ImageFile::new(bytes, "image_url".to_owned(), ReadingRule::default());
+    let file = ImageFile::new(bytes, "image_url".to_owned(), DecodeRule::default());
     let rgb = file.decode().map_err(|e| invalid_image(e.to_string()))?;
     let payload =
         Payload::encode(&rgb, PayloadFormat::Png).map_err(|e| invalid_image(e.to_string()))?;

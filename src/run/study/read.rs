@@ -20,7 +20,7 @@ use crate::store::now;
 use crate::store::{AddressChange, Store, read_questions};
 use crate::types::manifests::{Counts, RunManifest, Status};
 use crate::types::{
-    AnswerReading, ChoiceDetail, Condition, Decides, Digest, QuestionId, Record, Reply,
+    ChoiceDetail, Condition, Decides, Digest, ParsedAnswer, QuestionId, Record, Reply,
     StoredDetail as _, TrialKey, TrialRef, Trials, UnreadReason,
 };
 use darkqa_score::answers::record::{Detail, answered};
@@ -284,7 +284,7 @@ impl People {
         };
         let mut answered = answered(blank, reply)?;
         if line.answer.is_none() {
-            let cannot_tell = Some(AnswerReading {
+            let cannot_tell = Some(ParsedAnswer {
                 chosen: None,
                 why: Some(UnreadReason::CannotTell),
             });

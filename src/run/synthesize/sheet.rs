@@ -99,7 +99,7 @@ fn footer(light: &LightSettings, frame: &FrameId, degradations: &[Degradation]) 
     if has_kind(degradations, Kind::has_noise) {
         facts.push(camera_and_seed(light));
     }
-    if has_kind(degradations, Kind::has_readings) {
+    if has_kind(degradations, Kind::has_profiles) {
         let key = NoiseKey::new(light.kinds.sensor.seed, frame);
         facts.extend(
             light
@@ -182,7 +182,7 @@ fn draw_levels(frame: &mut FrameWork<'_>, light: &LightSettings) -> Result<Rgb> 
                 });
                 let name = match variant.kind {
                     Some(Kind::Exposure) => "EV".to_owned(),
-                    _ => variant.kind_and_reading(),
+                    _ => variant.kind_and_profile(),
                 };
                 let images = images.collect::<Result<_>>()?;
                 Ok(LevelRow { name, images })

@@ -7,7 +7,7 @@ use super::choice_member::ChoiceMember;
 use crate::report::site::{ChoiceRow, GroupRows, Ranking};
 use crate::run_reports::combine::clusters;
 use crate::types::{ChoiceDetail, ModelListing, RunQuestion, Trials};
-use darkqa_score::choice::ReadingMode;
+use darkqa_score::choice::ParsingMode;
 use darkqa_score::comparisons::{BestInTheDark, best_in_the_dark, rank_ranges};
 use darkqa_score::grid::Grid;
 
@@ -77,7 +77,7 @@ fn best(
     let clusters = clusters(trials, questions);
     let grid = Grid::for_models(trials, &clusters, &ModelListing::default(), |_| true);
     (
-        best_in_the_dark(&grid, ReadingMode::Strict),
+        best_in_the_dark(&grid, ParsingMode::Strict),
         clusters.unit().to_string(),
     )
 }

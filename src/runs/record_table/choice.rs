@@ -11,7 +11,7 @@ use crate::store::CellKind::{Bool, Int8, Int32, Text};
 use crate::store::Presence::{Always, MayBeNull};
 use crate::store::{Cell, Column};
 use crate::types::manifests::RunManifest;
-use crate::types::{AnswerReading, ChoiceDetail, Record, RunQuestion};
+use crate::types::{ChoiceDetail, ParsedAnswer, Record, RunQuestion};
 
 impl TableDetail for ChoiceDetail {
     const TABLE: &'static str = "darkqa.records/1";
@@ -119,7 +119,7 @@ fn reading_columns() -> Vec<Column<ChoiceRow>> {
     ]
 }
 
-fn chosen(reading: Option<AnswerReading>) -> Option<usize> {
+fn chosen(reading: Option<ParsedAnswer>) -> Option<usize> {
     reading.and_then(|reading| reading.chosen)
 }
 
@@ -130,14 +130,14 @@ fn choice_text(row: &ChoiceRow, index: Option<usize>) -> Cell<'_> {
 }
 
 /// True if the parsed choice is the true one; null if the trial failed or the true choice is unknown.
-fn right<'r>(row: &ChoiceRow, reading: Option<AnswerReading>) -> Cell<'r> {
+fn right<'r>(row: &ChoiceRow, reading: Option<ParsedAnswer>) -> Cell<'r> {
     match (reading, row.record.detail.truth) {
         (Some(reading), Some(truth)) => Cell::Bool(reading.chosen == Some(truth)),
         _ => Cell::Null,
     }
 }
 
-fn why<'r>(reading: Option<AnswerReading>) -> Cell<'r> {
+fn why<'r>(reading: Option<ParsedAnswer>) -> Cell<'r> {
     let why = reading.and_then(|reading| reading.why);
     why.map_or(Cell::Null, |why| serialized_word(&why))
 }

@@ -7,7 +7,7 @@ use super::accuracies::{
 use super::answers::confusion::{Confusion, Hallucination, confusions, hallucinations};
 use super::bootstrap::Resamples;
 use super::calibration::{Calibration, calibrations};
-use super::choice::ReadingMode;
+use super::choice::ParsingMode;
 use super::cluster::{ClusterUnit, Clusters, FrameTies};
 use super::comparisons::{
     Agreement, BestInTheDark, Comparison, ComparisonKind, FindingByProfile, ModelsLeftOut,
@@ -190,8 +190,8 @@ impl<'a> Findings<'a> {
             averaged,
             left_out: models_left_out(&grid),
             by_profile: by_profile(&grid),
-            best: best_in_the_dark(&grid, ReadingMode::Strict),
-            lenient_best: best_in_the_dark(&grid, ReadingMode::Lenient),
+            best: best_in_the_dark(&grid, ParsingMode::Strict),
+            lenient_best: best_in_the_dark(&grid, ParsingMode::Lenient),
             comparisons: comparisons(&grid),
             curves: Vec::new(),
             calibrations: calibrations(&grid, &draws),

@@ -2,13 +2,13 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
-use super::choice::ReadingMode;
+use super::choice::ParsingMode;
 use super::cluster::Clusters;
 use super::estimate::ClusterCount;
 use super::model_in_condition::ModelInCondition;
 use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{
-    AnswerReading, AskedItem, ChoiceDetail, Family, ModelListing, TrialOutcome, TrialRef, Trials,
+    AskedItem, ChoiceDetail, Family, ModelListing, ParsedAnswer, TrialOutcome, TrialRef, Trials,
     Variant,
 };
 
@@ -46,11 +46,11 @@ impl TrialResult {
 
     /// Parsed choice in a mode: `None` without a reply, `Some(None)` for an unreadable reply.
     #[must_use]
-    pub fn reading(self, mode: ReadingMode) -> Option<Option<u8>> {
+    pub fn reading(self, mode: ParsingMode) -> Option<Option<u8>> {
         match (self, mode) {
             (Self::Absent | Self::Failed, _) => None,
-            (Self::Read { strict, .. }, ReadingMode::Strict) => Some(strict),
-            (Self::Read { lenient, .. }, ReadingMode::Lenient) => Some(lenient),
+            (Self::Read { strict, .. }, ParsingMode::Strict) => Some(strict),
+            (Self::Read { lenient, .. }, ParsingMode::Lenient) => Some(lenient),
         }
     }
 }
@@ -291,7 +291,7 @@ impl<'a> Grid<'a> {
         &self,
         subject: usize,
         family: Option<&Family>,
-        mode: ReadingMode,
+        mode: ParsingMode,
     ) -> Vec<ClusterCount> {
         let mut counts = vec![ClusterCount::default(); self.clusters];
         for (item, result) in self.family_items(subject, family) {
@@ -393,7 +393,7 @@ fn trial_result(trial: TrialRef<'_>) -> TrialResult {
 }
 
 /// Index of the parsed choice, at most 255; `None` if no choice could be parsed.
-fn chosen_index(reading: AnswerReading) -> Option<u8> {
+fn chosen_index(reading: ParsedAnswer) -> Option<u8> {
     let index = reading.chosen?;
     Some(index.min(usize::from(u8::MAX)) as u8)
 }

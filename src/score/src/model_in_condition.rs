@@ -119,7 +119,7 @@ impl ModelInCondition {
         let light = match (&self.variant.pair, self.variant.kind) {
             (Some(pair), _) => pair.to_string(),
             (None, None) => level.to_string(),
-            (None, Some(_)) => format!("{level}-{}", self.variant.kind_and_reading()),
+            (None, Some(_)) => format!("{level}-{}", self.variant.kind_and_profile()),
         };
         let enhancer = self
             .enhancer

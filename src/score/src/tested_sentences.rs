@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::answers::confusion::{AgainstClean, Confusion, FalseAnswer};
 use super::calibration::MIN_CONFIDENT_REPLIES;
-use super::choice::ReadingMode;
+use super::choice::ParsingMode;
 use super::cluster::MIN_SCENES;
 use super::comparisons::{BestInTheDark, ComparisonKind, PooledFinding, PooledKind};
 use super::findings::Findings;
@@ -84,7 +84,7 @@ impl Findings<'_> {
     /// Corrects the p-values of all tests behind sentences, separately for each parsing of the replies.
     pub(super) fn correct_sentences(&mut self) {
         let tree = report_tests(self);
-        for mode in ReadingMode::ALL {
+        for mode in ParsingMode::ALL {
             for (test, p) in adjust_p_values(&tree, |test| test.p(self, mode)) {
                 test.set_p_report(self, mode, p);
             }
@@ -358,10 +358,10 @@ fn confidence(findings: &Findings<'_>) -> Tests {
 
 impl Test {
     /// p-value before correction in a parsing; 1 if the test was not computed. Confidence and fidelity exist only in strict parsing.
-    fn p(self, findings: &Findings<'_>, mode: ReadingMode) -> f64 {
+    fn p(self, findings: &Findings<'_>, mode: ParsingMode) -> f64 {
         let best = match mode {
-            ReadingMode::Strict => findings.best.as_ref(),
-            ReadingMode::Lenient => findings.lenient_best.as_ref(),
+            ParsingMode::Strict => findings.best.as_ref(),
+            ParsingMode::Lenient => findings.lenient_best.as_ref(),
         };
         let found = match self {
             Self::Pooled(index) => Some(findings.pooled[index].parsed(mode).p),
@@ -383,11 +383,11 @@ impl Test {
     }
 
     /// Stores the corrected p-value.
-    fn set_p_report(self, findings: &mut Findings<'_>, mode: ReadingMode, p: f64) {
+    fn set_p_report(self, findings: &mut Findings<'_>, mode: ParsingMode, p: f64) {
         let p = Some(p);
         let best = match mode {
-            ReadingMode::Strict => findings.best.as_mut(),
-            ReadingMode::Lenient => findings.lenient_best.as_mut(),
+            ParsingMode::Strict => findings.best.as_mut(),
+            ParsingMode::Lenient => findings.lenient_best.as_mut(),
         };
         match self {
             Self::Pooled(index) => findings.pooled[index].set_p_report(mode, p),
@@ -395,8 +395,8 @@ impl Test {
             Self::Comparison(index) => {
                 let comparison = &mut findings.comparisons[index];
                 match mode {
-                    ReadingMode::Strict => comparison.strict.p_report = p,
-                    ReadingMode::Lenient => comparison.lenient.p_report = p,
+                    ParsingMode::Strict => comparison.strict.p_report = p,
+                    ParsingMode::Lenient => comparison.lenient.p_report = p,
                 }
             }
             Self::Best => {
@@ -417,7 +417,7 @@ impl Test {
             }
             // Confidence and fidelity have one p-value, from strict parsing.
             Self::Overconfident(_) | Self::Growth(_) | Self::Fidelity
-                if mode == ReadingMode::Lenient => {}
+                if mode == ParsingMode::Lenient => {}
             Self::Overconfident(index) => findings.calibrations[index].overconfidence.p_report = p,
             Self::Growth(index) => {
                 if let Some(growth) = findings.calibrations[index].growth.as_mut() {

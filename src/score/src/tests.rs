@@ -1,7 +1,7 @@
 //! Tests of the findings over all models, [`super::comparisons`], on synthetic records.
 
 use super::answers::confusion::{Collapse, FalseAnswer, confusions};
-use super::choice::ReadingMode;
+use super::choice::ParsingMode;
 use super::cluster::{Clusters, FrameTies};
 use super::comparisons::paired::PairedComparison;
 use super::comparisons::{PooledFinding, PooledKind, best_in_the_dark, pooled};
@@ -10,7 +10,7 @@ use super::grid::Grid;
 use super::model_in_condition::ModelInCondition;
 use super::significance::Significance;
 use darkqa_ground::types::{
-    AnswerReading, ChoiceDetail, Condition, Digest, Family, FrameId, QuestionId, Record,
+    ChoiceDetail, Condition, Digest, Family, FrameId, ParsedAnswer, QuestionId, Record,
     TrialOutcome,
 };
 
@@ -26,7 +26,7 @@ pub(super) fn records(model: &str, condition: &str, answers: Answers) -> Vec<Rec
     (0..2 * FRAMES)
         .map(|item: usize| {
             let right = answers(item);
-            let chosen = right.map(|right| AnswerReading {
+            let chosen = right.map(|right| ParsedAnswer {
                 chosen: Some(usize::from(!right)),
                 why: None,
             });
@@ -93,7 +93,7 @@ fn one_model_pooled_is_its_own_comparison() {
         let (findings, _) = pooled(grid);
         let dark = find(&findings, PooledKind::Darkness, "L3-noise")[0];
         // The subjects are sorted: L0, L3-noise, L5-noise of the model, then the observer.
-        let own = PairedComparison::new(grid, 1, 0, None, ReadingMode::Strict).unwrap();
+        let own = PairedComparison::new(grid, 1, 0, None, ParsingMode::Strict).unwrap();
         assert_eq!(dark.models, ["m"]);
         assert_eq!(dark.strict.difference, own.difference);
         assert!((dark.strict.p - own.p).abs() < 1e-15);
@@ -219,7 +219,7 @@ fn the_best_is_shown_better_than_every_other() {
     // Not asked of all models: not a level of the comparison.
     all.extend(records("good", "L3-noise", |_| Some(true)));
     with_grid(&all, |grid| {
-        let best = best_in_the_dark(grid, ReadingMode::Strict).unwrap();
+        let best = best_in_the_dark(grid, ParsingMode::Strict).unwrap();
         assert_eq!(best.variant.to_string(), "noise");
         assert_eq!((best.levels.len(), best.lighter.len()), (1, 1));
         assert_eq!((best.items, best.dropped, best.clusters), (23, 1, 12));
@@ -238,13 +238,13 @@ fn the_best_is_shown_better_than_every_other() {
     });
     all.retain(|record| record.model != "same");
     with_grid(&all, |grid| {
-        let best = best_in_the_dark(grid, ReadingMode::Strict).unwrap();
+        let best = best_in_the_dark(grid, ParsingMode::Strict).unwrap();
         assert!(best.is_shown() && best.pairs.len() == 1);
     });
     all.retain(|record| record.model != "guess");
     assert!(with_grid(&all, |grid| best_in_the_dark(
         grid,
-        ReadingMode::Strict
+        ParsingMode::Strict
     )
     .is_none()));
 }
@@ -278,7 +278,7 @@ fn presence(model: &str, condition: &str, reply: fn(usize, bool) -> Option<bool>
         detail.choices = ["Yes", "no"].map(str::to_owned).to_vec();
         detail.truth = Some(usize::from(!is_there));
         let chosen = reply(item / 2, is_there).map(|yes| usize::from(!yes));
-        detail.strict = Some(AnswerReading { chosen, why: None });
+        detail.strict = Some(ParsedAnswer { chosen, why: None });
     }
     records
 }

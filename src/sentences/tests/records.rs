@@ -3,7 +3,7 @@
 use super::checked;
 use crate::sentences::{Sentence, Tone, sentences};
 use crate::types::{
-    AnswerReading, ChoiceDetail, Condition, Digest, Family, FrameId, ModelListing, QuestionId,
+    ChoiceDetail, Condition, Digest, Family, FrameId, ModelListing, ParsedAnswer, QuestionId,
     Record, RunGroup, TrialOutcome, UnreadReason,
 };
 use darkqa_score::cluster::FrameTies;
@@ -19,7 +19,7 @@ fn asked(model: &str, frames: usize, conditions: &[(&str, f64)]) -> Vec<Record> 
         let condition: Option<Condition> = (*name != "blind").then(|| name.parse().unwrap());
         for item in 0..2 * frames {
             let wrong = usize::from(((item / 2 % 2) as f64) >= 2.0 * share);
-            let reading = Some(AnswerReading {
+            let reading = Some(ParsedAnswer {
                 chosen: Some(wrong),
                 why: None,
             });
@@ -346,7 +346,7 @@ fn people_are_in_no_mean() {
     let mut people = asked("human", FRAMES, &bright);
     let cannot_tell = people.iter_mut().rev().take(3);
     for record in cannot_tell {
-        let reading = Some(AnswerReading {
+        let reading = Some(ParsedAnswer {
             chosen: None,
             why: Some(UnreadReason::CannotTell),
         });
@@ -415,7 +415,7 @@ fn two_families_are_compared() {
             .as_ref()
             .is_some_and(|condition| condition.degradation().is_some());
         if is_dark && record.detail.family == Family::RoomType {
-            let right = Some(AnswerReading {
+            let right = Some(ParsedAnswer {
                 chosen: Some(0),
                 why: None,
             });
@@ -443,7 +443,7 @@ fn scripted(model: &str, conditions: &[(&str, usize)]) -> Vec<Record> {
         for (item, record) in answers.iter_mut().enumerate() {
             // A step of 37 visits all hundredths in a mixed order.
             let chosen = usize::from(item * 37 % 100 >= *percent);
-            let reading = Some(AnswerReading {
+            let reading = Some(ParsedAnswer {
                 chosen: Some(chosen),
                 why: None,
             });
@@ -460,7 +460,7 @@ fn wordy(records: &mut [Record], condition: &str) {
         .iter_mut()
         .filter(|record| record.condition.as_ref() == Some(&condition));
     for record in own.step_by(5) {
-        record.detail.strict = Some(AnswerReading {
+        record.detail.strict = Some(ParsedAnswer {
             chosen: None,
             why: Some(UnreadReason::NoChoice),
         });

@@ -9,7 +9,7 @@ use rand_distr::{Distribution, StandardNormal};
 use super::records::unanswered;
 use crate::sentences::{Sentence, Tone, sentences};
 use crate::types::{
-    AnswerReading, ChoiceDetail, Condition, Digest, Family, FrameId, OptionProbabilities,
+    ChoiceDetail, Condition, Digest, Family, FrameId, OptionProbabilities, ParsedAnswer,
     QuestionId, Record, TrialOutcome,
 };
 use darkqa_score::accuracies::healths;
@@ -163,7 +163,7 @@ fn set_answer(detail: &mut ChoiceDetail, p: f64, drawn: f64) {
         1 + ((drawn - p) / (1.0 - p) * (choices - 1) as f64) as usize
     };
     let chosen = chosen.min(choices - 1);
-    let reading = Some(AnswerReading {
+    let reading = Some(ParsedAnswer {
         chosen: Some(chosen),
         why: None,
     });

@@ -9,9 +9,9 @@ use std::io::Cursor;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
+use darkqa_picture::DecodeRule;
 use darkqa_picture::ImageFile;
-use darkqa_picture::ReadingRule;
-use darkqa_picture::reading_rule::MAX_PIXELS;
+use darkqa_picture::decode_rule::MAX_PIXELS;
 use image::{DynamicImage, ImageFormat, Rgb};
 
 use exr::prelude::Compression;
@@ -192,7 +192,7 @@ fn read_mutated(rounds: usize) -> [usize; 2] {
     for round in 0..rounds {
         let bytes = mutate(&corpus[round % corpus.len()], &mut random);
         let place = format!("mutation {round}");
-        let picture = ImageFile::new(bytes, place, ReadingRule::default());
+        let picture = ImageFile::new(bytes, place, DecodeRule::default());
         // What passes the check may still not decode: an error, no more.
         let _ = picture.check();
         match picture.decode() {
@@ -216,7 +216,7 @@ const MOST_BYTES: usize = MAX_PIXELS as usize * 12;
 fn a_profile_that_grows_without_bound_takes_no_memory() {
     let pixels = image::RgbImage::new(4, 4);
     let bytes = png_with_profile(&pixels, &vec![0; 256 << 20]);
-    let file = ImageFile::new(bytes, "a bomb".to_owned(), ReadingRule::default());
+    let file = ImageFile::new(bytes, "a bomb".to_owned(), DecodeRule::default());
     LARGEST.set(0);
     let (digest, error) = (file.digest(), file.decode().unwrap_err());
     assert_eq!(digest, file.digest());
@@ -234,7 +234,7 @@ fn texts_that_grow_without_bound_take_no_memory() {
     ] {
         let chunks = [packed_chunk(kind, head, &bomb)];
         let bytes = with_chunks(&png(&pixels), &chunks);
-        let file = ImageFile::new(bytes, "a bomb".to_owned(), ReadingRule::default());
+        let file = ImageFile::new(bytes, "a bomb".to_owned(), DecodeRule::default());
         LARGEST.set(0);
         assert_eq!(file.decode().unwrap().width(), 4);
         assert!(LARGEST.get() <= 16 << 20);

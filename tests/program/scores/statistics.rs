@@ -16,12 +16,12 @@ use crate::support::made::record;
 use crate::support::table::check_rows;
 use darkqa_eval::Kind;
 use darkqa_ground::types::{
-    AnswerReading, AxisLevel, Condition, Degradation, EnhancerName, Family, Record, Severity,
+    AxisLevel, Condition, Degradation, EnhancerName, Family, ParsedAnswer, Record, Severity,
     Variant,
 };
 use darkqa_score::accuracies::curves;
 use darkqa_score::bootstrap::Resamples;
-use darkqa_score::choice::ReadingMode;
+use darkqa_score::choice::ParsingMode;
 use darkqa_score::cluster::Clusters;
 use darkqa_score::cluster::FrameTies;
 use darkqa_score::comparisons::paired::PairedComparison;
@@ -255,7 +255,7 @@ fn paired(records: &[Record]) -> PairedComparison {
         .iter()
         .position(|s| s.enhancer.is_none())
         .unwrap();
-    PairedComparison::new(&grid, 1 - raw, raw, None, ReadingMode::Strict).unwrap()
+    PairedComparison::new(&grid, 1 - raw, raw, None, ParsingMode::Strict).unwrap()
 }
 
 #[test]
@@ -399,7 +399,7 @@ fn a_made_set_gives_the_papers_arithmetic() {
         made.detail.family = family;
         made.detail.choices = choices.iter().map(|&text| text.to_owned()).collect();
         made.detail.truth = Some(truth);
-        made.detail.strict = Some(AnswerReading { chosen, why: None });
+        made.detail.strict = Some(ParsedAnswer { chosen, why: None });
         records.push(made);
     };
     for chosen in [0, 1, 1, 1] {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Deserialize;
 
-use crate::{ReadingMode, read};
+use crate::{ParsingMode, read};
 use darkqa_ground::types::questions::{Answer, Choices};
 
 /// One line of the table: the rule, the set of choices, the reply, and the choice that a person finds in it.
@@ -46,7 +46,7 @@ fn rules_agree_with_a_person() {
     let mut counts = BTreeMap::<String, [usize; 2]>::new();
     for line in include_str!("../../../../tests/data/replies_by_rule.jsonl").lines() {
         let case: Case = serde_json::from_str(line).unwrap();
-        let found = match read(&case.reply, &choices(&case.of), ReadingMode::Lenient) {
+        let found = match read(&case.reply, &choices(&case.of), ParsingMode::Lenient) {
             Answer::Chosen(index) => Some(index),
             Answer::Unparsed(_) => None,
         };
@@ -80,7 +80,7 @@ fn rules_do_not_change_the_strict_parsing() {
         ("table", "tables", 2),
         ("dark", "brightness", 0),
     ] {
-        for mode in ReadingMode::ALL {
+        for mode in ParsingMode::ALL {
             assert_eq!(
                 read(reply, &choices(set), mode),
                 Answer::Chosen(index),
@@ -97,7 +97,7 @@ fn rules_do_not_change_the_strict_parsing() {
         "I rule out B.",
     ] {
         for (set, _) in SETS {
-            let strict = read(reply, &choices(set), ReadingMode::Strict);
+            let strict = read(reply, &choices(set), ParsingMode::Strict);
             assert!(matches!(strict, Answer::Unparsed(_)), "{reply}");
         }
     }

@@ -7,13 +7,13 @@ use proptest::prelude::*;
 use super::by_rule::choices;
 use super::reply;
 use crate::text::words::{Role, lists};
-use crate::{ReadingMode, read};
+use crate::{ParsingMode, read};
 use darkqa_ground::types::questions::Answer;
 
 const SETS: [&str; 6] = ["home", "yes_no", "colors", "things", "sofas", "numbers"];
 
 fn lenient(reply: &str, set: &str) -> Answer {
-    read(reply, &choices(set), ReadingMode::Lenient)
+    read(reply, &choices(set), ParsingMode::Lenient)
 }
 
 /// Sentences around a lone name.
@@ -95,7 +95,7 @@ proptest! {
     fn chosen_text_parses_as_the_choice(reply in reply(), set in prop::sample::select(&SETS[..])) {
         if let Answer::Chosen(index) = lenient(&reply, set) {
             let texts = choices(set);
-            for mode in ReadingMode::ALL {
+            for mode in ParsingMode::ALL {
                 prop_assert_eq!(read(&texts.texts()[index], &texts, mode), Answer::Chosen(index));
             }
         }

@@ -5,7 +5,7 @@ use super::choices_of;
 use crate::choice_views::{ChoiceViews, Naming};
 use crate::text::words::{Role, Roles, lists, phrase_at};
 use crate::text::{fold, tokens};
-use crate::{ReadingMode, read};
+use crate::{ParsingMode, read};
 use darkqa_ground::types::questions::Answer;
 
 /// A role, a set of choices, a reply in which an entry of the role replaces `{}`, the choice in it, a reply without such an entry, and the
@@ -69,7 +69,7 @@ const EXAMPLES: [Example; 42] = [
 const CHOICE_ROLES: [Role; 4] = [Role::Color, Role::Shade, Role::Place, Role::Number];
 
 fn lenient(set: &str, reply: &str) -> Option<usize> {
-    match read(reply, &choices(set), ReadingMode::Lenient) {
+    match read(reply, &choices(set), ParsingMode::Lenient) {
         Answer::Chosen(index) => Some(index),
         Answer::Unparsed(_) => None,
     }
@@ -202,7 +202,7 @@ fn object_names_end_in_a_head() {
             read(
                 &format!("A {thing} {next}."),
                 &choices,
-                ReadingMode::Lenient,
+                ParsingMode::Lenient,
             )
         });
         assert_eq!(object, Answer::Chosen(0), "{thing} {word}");

@@ -9,7 +9,7 @@ use crate::dataset::ready_made::columns::{Column, ImageColumns, Roles};
 use crate::dataset::ready_made::container::SetFile;
 use crate::error::{Error, Result};
 use crate::picture::image_file::format::FileFormat;
-use crate::picture::{ImageFile, ReadingRule};
+use crate::picture::{DecodeRule, ImageFile};
 
 /// Reference to an image of a row.
 #[derive(Debug, Clone)]
@@ -195,7 +195,7 @@ impl EmbeddedImage {
     ///
     /// # Errors
     /// If the table cannot be read, or has changed since it was opened.
-    pub(in crate::dataset) fn read_image(&self, rule: ReadingRule) -> Result<ImageFile> {
+    pub(in crate::dataset) fn read_image(&self, rule: DecodeRule) -> Result<ImageFile> {
         let place = format!("{}, {}", self.file.label.path.display(), self.row);
         let value = self
             .file

@@ -16,7 +16,7 @@ pub mod values;
 
 pub use degradations::{
     Axis, AxisLevel, Condition, ConditionColumns, Degradation, EnhancerName, ExposureFacts,
-    KindSet, PairDark, PairFacts, PhotoName, ReadingName, RunGroup, SetLight, Severity, Treatment,
+    KindSet, PairDark, PairFacts, PhotoName, ProfileName, RunGroup, SetLight, Severity, Treatment,
     TreatmentSet, Variant,
 };
 #[cfg(feature = "program")]
@@ -39,8 +39,8 @@ pub use questions::{
 };
 #[cfg(feature = "program")]
 pub use records::{
-    AnswerReading, AskedItem, AskedParts, ChoiceDetail, ChoiceFacts, ChoiceTables, Failure,
-    FailureKind, ImageFacts, ImageFidelity, KeptTrial, ObjectCrop, OpenDetail, SentImages, Step,
+    AskedItem, AskedParts, ChoiceDetail, ChoiceFacts, ChoiceTables, Failure, FailureKind,
+    ImageFacts, ImageFidelity, KeptTrial, ObjectCrop, OpenDetail, ParsedAnswer, SentImages, Step,
     StoredDetail, TextPlace, Thumbnail, TrialKey, TrialOutcome, TrialRef, Trials, Via, View,
     WalkFacts,
 };
@@ -71,8 +71,8 @@ mod tests {
         prop::option::of(
             (kind, 1..=1600_u16, reading).prop_map(|(kind, severity, reading)| {
                 let reading = reading
-                    .filter(|_| kind.has_readings())
-                    .map(|name| ReadingName::new(&name).unwrap());
+                    .filter(|_| kind.has_profiles())
+                    .map(|name| ProfileName::new(&name).unwrap());
                 Degradation::new(kind, Severity::from_hundredths(severity), reading).unwrap()
             }),
         )

@@ -7,7 +7,7 @@ use std::sync::{Arc, LazyLock};
 use self::table::InkTable;
 use super::icc::InkProfile;
 use super::{CACHED_PROFILES, ColourTag, MAX_PROFILE_BYTES, REMEDY, profile_too_large};
-use crate::reading_rule::ColourRule;
+use crate::decode_rule::ColourRule;
 use darkqa_ground::types::values::Recent;
 use darkqa_ground::types::{ColourHandling, ColourNote, Digest};
 

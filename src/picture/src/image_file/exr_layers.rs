@@ -9,7 +9,7 @@ use exr::meta::header::Header;
 use exr::prelude::{ReadChannels as _, ReadLayers as _, Vec2, read as read_image};
 
 use crate::colour::primaries::Primaries;
-use crate::reading_rule::ReadingRule;
+use crate::decode_rule::DecodeRule;
 
 /// The first four bytes of every OpenEXR file.
 pub(super) const SIGNATURE: &[u8] = b"\x76\x2F\x31\x01";
@@ -41,7 +41,7 @@ impl ExrFile {
     ///
     /// # Errors
     /// If they are broken, no layer has the three colour channels as floats, or the image is larger than the rule allows.
-    pub(super) fn open(file: &[u8], rule: &ReadingRule) -> Result<Self, String> {
+    pub(super) fn open(file: &[u8], rule: &DecodeRule) -> Result<Self, String> {
         let reader = block::read(Cursor::new(file), false).map_err(|e| unreadable(&e))?;
         let headers = reader.headers();
         let mut layers = (0..headers.len()).filter(|index| has_colours(&headers[*index]));

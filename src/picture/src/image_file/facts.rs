@@ -9,7 +9,7 @@ use super::png_chunks::{self, PngFault, PngProperties};
 use super::tiff_tags::TiffProperties;
 use super::webp_chunks::{self, WebpProperties};
 use crate::colour::ColourTag;
-use crate::reading_rule::ReadingRule;
+use crate::decode_rule::DecodeRule;
 use darkqa_ground::files::guarded::guarded;
 
 /// Facts in the headers of an image file that decide how it is decoded.
@@ -114,7 +114,7 @@ impl FileFacts {
             }
             FileFormat::Bmp => Self::NONE,
             FileFormat::OpenExr => {
-                let opened = guarded(|| ExrFile::open(file, &ReadingRule::UNBOUNDED)).ok();
+                let opened = guarded(|| ExrFile::open(file, &DecodeRule::UNBOUNDED)).ok();
                 let layers = opened.as_ref().map_or(0, |file| file.layers);
                 let primaries = opened.and_then(|file| file.primaries);
                 Self {

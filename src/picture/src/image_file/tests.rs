@@ -3,7 +3,7 @@ use image::{GrayImage, ImageFormat, RgbImage, RgbaImage};
 use super::*;
 
 fn image_file(bytes: Vec<u8>, place: impl Into<String>) -> ImageFile {
-    ImageFile::new(bytes, place.into(), ReadingRule::default())
+    ImageFile::new(bytes, place.into(), DecodeRule::default())
 }
 
 fn png(image: &DynamicImage) -> ImageFile {

@@ -1,6 +1,6 @@
 use proptest::prelude::*;
 
-use super::super::reading_rule::MAX_PIXELS;
+use super::super::decode_rule::MAX_PIXELS;
 use super::*;
 
 /// A PNG file with these packed rows.

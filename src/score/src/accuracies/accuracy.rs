@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::chance::{OfferedChoices, chance, chance_of_questions};
 use super::health::Health;
-use crate::choice::ReadingMode;
+use crate::choice::ParsingMode;
 use crate::estimate::{ClusterCount, Estimate};
 use crate::grid::{Grid, GridItem, TrialResult};
 use crate::model_in_condition::{CHANCE, ModelInCondition};
@@ -21,7 +21,7 @@ pub struct AccuracyCell {
     /// Question family; `None` for all families together.
     pub family: Option<Family>,
     /// Parsing of the replies.
-    pub mode: ReadingMode,
+    pub mode: ParsingMode,
     /// Number of replies that named the true choice.
     pub right: usize,
     /// Number of unreadable replies. They count as wrong, like “cannot tell” by a person.
@@ -59,7 +59,7 @@ impl AccuracySummary {
     pub fn family_cells<'s>(
         &'s self,
         family: Option<&'s Family>,
-        mode: ReadingMode,
+        mode: ParsingMode,
     ) -> impl Iterator<Item = &'s AccuracyCell> + Clone {
         self.cells
             .iter()
@@ -72,7 +72,7 @@ impl AccuracySummary {
         &self,
         subject: &ModelInCondition,
         family: Option<&Family>,
-        mode: ReadingMode,
+        mode: ParsingMode,
     ) -> Option<&AccuracyCell> {
         self.cells.iter().find(|cell| {
             cell.mode == mode && cell.family.as_ref() == family && cell.subject == *subject
@@ -94,7 +94,7 @@ pub(crate) fn summarize(
         .into_par_iter()
         .flat_map_iter(|subject| {
             families.iter().flat_map(move |family| {
-                ReadingMode::ALL.map(|mode| cell(grid, subject, *family, mode))
+                ParsingMode::ALL.map(|mode| cell(grid, subject, *family, mode))
             })
         })
         .collect();
@@ -121,7 +121,7 @@ fn cell(
     grid: &Grid<'_>,
     subject: usize,
     family: Option<&Family>,
-    mode: ReadingMode,
+    mode: ParsingMode,
 ) -> AccuracyCell {
     let (mut unparsed, mut failed) = (0, 0);
     for (index, _) in grid
@@ -162,7 +162,7 @@ fn always(
     grid: &Grid<'_>,
     subject: usize,
     family: Option<&Family>,
-    mode: ReadingMode,
+    mode: ParsingMode,
 ) -> Option<Estimate> {
     let mut clusters = vec![ClusterCount::default(); grid.clusters];
     let mut is_once = true;
@@ -206,7 +206,7 @@ fn chance_cells(questions: &[OfferedChoices]) -> Vec<AccuracyCell> {
                     .iter()
                     .filter(|question| family.is_none_or(|family| question.family == *family)),
             );
-            ReadingMode::ALL.map(|mode| AccuracyCell {
+            ParsingMode::ALL.map(|mode| AccuracyCell {
                 subject: ModelInCondition {
                     model: CHANCE.to_owned(),
                     view: None,

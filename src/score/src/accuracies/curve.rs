@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::bootstrap::Resamples;
-use crate::choice::ReadingMode;
+use crate::choice::ParsingMode;
 use crate::grid::{Grid, TrialResult};
 use crate::threshold::{CurveSummary, LevelCounts};
 use darkqa_ground::types::degradations::Kind;
@@ -33,10 +33,10 @@ impl Curve {
 
     /// Threshold and area in a parsing.
     #[must_use]
-    pub fn parsed(&self, mode: ReadingMode) -> &CurveSummary {
+    pub fn parsed(&self, mode: ParsingMode) -> &CurveSummary {
         match mode {
-            ReadingMode::Strict => &self.summary,
-            ReadingMode::Lenient => &self.lenient,
+            ParsingMode::Strict => &self.summary,
+            ParsingMode::Lenient => &self.lenient,
         }
     }
 }
@@ -111,7 +111,7 @@ fn curve(
     points: CurvePoints,
 ) -> Option<Curve> {
     let subjects = &points.subjects;
-    let [strict, lenient] = ReadingMode::ALL.map(|mode| LevelCounts {
+    let [strict, lenient] = ParsingMode::ALL.map(|mode| LevelCounts {
         levels: subjects.iter().map(|(level, _)| *level).collect(),
         counts: subjects
             .iter()

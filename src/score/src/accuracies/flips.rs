@@ -1,7 +1,7 @@
 //! First level at which each item is answered wrongly: [`FirstFailure`].
 
 use super::curve::CurvePoints;
-use crate::choice::ReadingMode;
+use crate::choice::ParsingMode;
 use crate::grid::Grid;
 use darkqa_ground::types::AxisLevel;
 
@@ -26,7 +26,7 @@ impl FirstFailure {
     #[must_use]
     pub fn first(&self, grid: &Grid<'_>, item: usize) -> Option<AxisLevel> {
         for &(level, subject) in &self.curve.subjects {
-            let chosen = grid.result(subject, item).reading(ReadingMode::Strict)?;
+            let chosen = grid.result(subject, item).reading(ParsingMode::Strict)?;
             if !grid.items[item].is_right(chosen) {
                 return Some(level);
             }

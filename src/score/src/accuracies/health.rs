@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::choice::ReadingMode;
+use crate::choice::ParsingMode;
 use crate::grid::{Grid, TrialResult};
 use crate::model_in_condition::ModelInCondition;
 use darkqa_ground::types::{FailureKind, TrialRef, UnreadReason};
@@ -25,7 +25,7 @@ pub struct Health {
 
 impl Health {
     fn count(&mut self, result: TrialResult, trial: TrialRef<'_>) {
-        let Some(strict) = result.reading(ReadingMode::Strict) else {
+        let Some(strict) = result.reading(ParsingMode::Strict) else {
             if let Some((kind, _)) = trial.failure() {
                 *self.failed.entry(kind).or_default() += 1;
             }
@@ -33,7 +33,7 @@ impl Health {
         };
         self.replies += 1;
         self.read += usize::from(strict.is_some());
-        let lenient = result.reading(ReadingMode::Lenient).flatten();
+        let lenient = result.reading(ParsingMode::Lenient).flatten();
         self.lenient_only += usize::from(strict.is_none() && lenient.is_some());
         if let Some(reason) = trial.strict().and_then(|reading| reading.why) {
             *self.unread.entry(reason).or_default() += 1;

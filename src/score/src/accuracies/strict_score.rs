@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use crate::choice::ReadingMode;
+use crate::choice::ParsingMode;
 use crate::estimate::{ClusterCount, Estimate};
 use crate::grid::{Grid, TrialResult};
 use crate::model_in_condition::ModelInCondition;
@@ -15,7 +15,7 @@ pub struct GroupCell {
     /// Family whose pure groups are scored; `None` for all groups.
     pub family: Option<Family>,
     /// Parsing of the replies.
-    pub mode: ReadingMode,
+    pub mode: ParsingMode,
     /// Number of groups in which every question was answered right every time.
     pub right: usize,
     /// Number of groups with a question that was not asked or has no reply. They are not scored.
@@ -95,7 +95,7 @@ impl StrictScore {
         for subject in 0..grid.subjects.len() {
             for family in &families {
                 let groups = family_groups(&groups, *family);
-                for mode in ReadingMode::ALL {
+                for mode in ParsingMode::ALL {
                     cells.extend(cell(grid, subject, *family, &groups, mode));
                 }
             }
@@ -123,7 +123,7 @@ impl StrictScore {
     /// Cell of the same subject and family in the lenient parsing.
     pub fn lenient(&self, strict: &GroupCell) -> Option<&GroupCell> {
         self.cells.iter().find(|cell| {
-            cell.mode == ReadingMode::Lenient
+            cell.mode == ParsingMode::Lenient
                 && cell.family == strict.family
                 && cell.subject == strict.subject
         })
@@ -217,7 +217,7 @@ impl Group<'_> {
 
     /// Result of the group for a subject. Orders and repeats that the subject was not asked are ignored, if every question has a reply and
     /// no trial failed.
-    fn result(&self, grid: &Grid<'_>, subject: usize, mode: ReadingMode) -> GroupResult {
+    fn result(&self, grid: &Grid<'_>, subject: usize, mode: ParsingMode) -> GroupResult {
         let mut replied = BTreeSet::<&QuestionId>::new();
         let (mut is_asked, mut has_failed, mut is_right) = (false, false, true);
         for &item in &self.items {
@@ -248,7 +248,7 @@ fn cell(
     subject: usize,
     family: Option<&Family>,
     groups: &[&Group<'_>],
-    mode: ReadingMode,
+    mode: ParsingMode,
 ) -> Option<GroupCell> {
     let mut counts = BTreeMap::<usize, ClusterCount>::new();
     let (mut incomplete, mut is_asked) = (0, false);

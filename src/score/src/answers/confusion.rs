@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::choice::ReadingMode;
+use crate::choice::ParsingMode;
 use crate::comparisons::paired::PairedComparison;
 use crate::estimate::{ClusterCount, Estimate};
 use crate::grid::{Grid, GridItem};
@@ -63,7 +63,7 @@ pub fn confusions(grid: &Grid<'_>) -> Vec<Confusion> {
 fn counts(grid: &Grid<'_>, subject: usize, family: &Family, labels: &[String]) -> Vec<Vec<usize>> {
     let mut counts = vec![vec![0; labels.len() + 1]; labels.len()];
     for (item, result) in grid.family_items(subject, Some(family)) {
-        let Some(chosen) = result.reading(ReadingMode::Strict) else {
+        let Some(chosen) = result.reading(ParsingMode::Strict) else {
             continue;
         };
         let [truth, predicted] = [item.asked.truth, chosen.map(usize::from)]
@@ -142,7 +142,7 @@ impl AgainstClean {
                 continue;
             }
             let [a, b] =
-                [subject, clean].map(|side| grid.result(side, index).reading(ReadingMode::Strict));
+                [subject, clean].map(|side| grid.result(side, index).reading(ParsingMode::Strict));
             let (Some(a), Some(b)) = (a, b) else { continue };
             for given in [a, b].into_iter().flatten() {
                 if let Some(text) = item.asked.choices.get(usize::from(given)) {
@@ -151,7 +151,7 @@ impl AgainstClean {
             }
         }
         let own = times.get(answer).copied().unwrap_or(0);
-        let [strict, lenient] = ReadingMode::ALL.map(|mode| {
+        let [strict, lenient] = ParsingMode::ALL.map(|mode| {
             PairedComparison::counting(
                 grid,
                 [subject, clean],
@@ -172,11 +172,11 @@ impl AgainstClean {
     }
 
     /// p-value of no difference in a parsing; 1 if another answer is more common.
-    pub(crate) fn p(&self, mode: ReadingMode) -> f64 {
+    pub(crate) fn p(&self, mode: ParsingMode) -> f64 {
         match mode {
             _ if !self.is_commonest => 1.0,
-            ReadingMode::Strict => self.strict.p,
-            ReadingMode::Lenient => self.lenient.p,
+            ParsingMode::Strict => self.strict.p,
+            ParsingMode::Lenient => self.lenient.p,
         }
     }
 
@@ -211,7 +211,7 @@ impl Collapse {
         let mut clusters = BTreeMap::<u32, ClusterCount>::new();
         let mut guess = 0.0;
         for (item, result) in grid.family_items(subject, Some(&confusion.family)) {
-            let Some(chosen) = result.reading(ReadingMode::Strict) else {
+            let Some(chosen) = result.reading(ParsingMode::Strict) else {
                 continue;
             };
             let choices = &*item.asked.choices;
@@ -337,7 +337,7 @@ pub fn hallucinations(grid: &Grid<'_>) -> Vec<Hallucination> {
 fn rate(grid: &Grid<'_>, subject: usize, answer: FalseAnswer) -> Option<Estimate> {
     let mut clusters = BTreeMap::<u32, ClusterCount>::new();
     for (item, result) in grid.family_items(subject, Some(&Family::Presence)) {
-        if let Some(chosen) = result.reading(ReadingMode::Strict)
+        if let Some(chosen) = result.reading(ParsingMode::Strict)
             && answer.is_false_for(item)
         {
             let count = clusters.entry(item.cluster).or_default();

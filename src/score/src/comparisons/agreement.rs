@@ -1,7 +1,7 @@
 //! Agreement of two models: [`Agreement`].
 
 use super::comparison::{ComparisonKind, pairs};
-use crate::choice::ReadingMode;
+use crate::choice::ParsingMode;
 use crate::estimate::{ClusterCount, Estimate};
 use crate::grid::Grid;
 use crate::model_in_condition::ModelInCondition;
@@ -81,7 +81,7 @@ fn agreement(grid: &Grid<'_>, first: usize, second: usize) -> Option<Agreement> 
     let mut counts = vec![AgreementCounts::default(); grid.clusters];
     for (index, item) in grid.items.iter().enumerate() {
         let [a, b] =
-            [first, second].map(|subject| grid.result(subject, index).reading(ReadingMode::Strict));
+            [first, second].map(|subject| grid.result(subject, index).reading(ParsingMode::Strict));
         let (Some(a), Some(b)) = (a, b) else {
             continue;
         };

@@ -4,7 +4,7 @@ use super::comparison::MIN_PAIRS;
 use super::holm_of;
 use super::paired::PairedComparison;
 use crate::accuracies::Health;
-use crate::choice::ReadingMode;
+use crate::choice::ParsingMode;
 use crate::grid::Grid;
 use crate::model_in_condition::ModelInCondition;
 use crate::significance::{ALPHA, Significance, least_p};
@@ -60,7 +60,7 @@ pub fn baseline_rows(
                     new.zip(old).is_some_and(|(new, old)| new != old)
                 })
                 .collect();
-            let mode = ReadingMode::Strict;
+            let mode = ParsingMode::Strict;
             Some(BaselineRow {
                 subject: grid.subjects[new].clone(),
                 paired: PairedComparison::on_items(grid, new, old, mode, |item, _| {

@@ -8,7 +8,7 @@ use super::holm_of;
 use super::paired::{ClusterNet, PairedTest};
 use super::pooled::pool;
 use crate::accuracies::{Coverage, shared};
-use crate::choice::ReadingMode;
+use crate::choice::ParsingMode;
 use crate::estimate::{ClusterCount, Estimate};
 use crate::grid::Grid;
 use crate::model_in_condition::ModelInCondition;
@@ -164,7 +164,7 @@ type Asked<'g> = (&'g str, BTreeSet<AxisLevel>);
 /// Compares the models in the dark, in one parsing. If they share no dark level, the darkest shared level counts as dark. `None` if fewer
 /// than two models were asked at L0 and at a degraded level, if the models share no item, or if there are too many models to compare.
 #[must_use]
-pub fn best_in_the_dark(grid: &Grid<'_>, mode: ReadingMode) -> Option<BestInTheDark> {
+pub fn best_in_the_dark(grid: &Grid<'_>, mode: ParsingMode) -> Option<BestInTheDark> {
     if !compares_models(grid) {
         return None;
     }
@@ -316,7 +316,7 @@ impl Scores {
         models: &[&str],
         variant: &Variant,
         levels: &[AxisLevel],
-        mode: ReadingMode,
+        mode: ParsingMode,
     ) -> Self {
         let subjects: Vec<Vec<usize>> = models
             .iter()
@@ -395,7 +395,7 @@ impl Scores {
     /// Tests the mean accuracy of the first model minus that of the second over a range of levels.
     fn test_pair(&self, [first, second]: [usize; 2], levels: Range<usize>) -> PairedTest {
         self.test(levels.len(), |item| {
-            item.right(first, &levels) - item.right(second, &levels)
+            item.right_count(first, &levels) - item.right_count(second, &levels)
         })
     }
 
@@ -413,12 +413,12 @@ impl Scores {
             .collect();
         let count = dark.len() as f64;
         let sums: Vec<(f64, f64)> = self
-            .cluster_sums(|item| item.right(model, &dark))
+            .cluster_sums(|item| item.right_count(model, &dark))
             .into_iter()
             .map(|sum| (sum.net as f64 / count, f64::from(sum.items)))
             .collect();
         let clean_counts: Vec<ClusterCount> = self
-            .cluster_sums(|item| item.right(model, &(0..1)))
+            .cluster_sums(|item| item.right_count(model, &(0..1)))
             .into_iter()
             .map(|sum| ClusterCount {
                 right: sum.net as u32,
@@ -429,7 +429,8 @@ impl Scores {
         let chance = self.items.iter().map(|item| item.guess).sum::<f64>() / n as f64;
         let loss = (clean.low > chance).then(|| {
             self.test(dark.len(), |item| {
-                item.right(model, &dark) - item.right(model, &(0..1)) * dark.len() as i64
+                item.right_count(model, &dark)
+                    - item.right_count(model, &(0..1)) * dark.len() as i64
             })
             .difference
         });

@@ -11,13 +11,13 @@ use std::collections::BTreeSet;
 use rayon::prelude::*;
 
 use super::paired::{ClusterNet, PairedTest};
-use crate::choice::ReadingMode;
+use crate::choice::ParsingMode;
 use crate::estimate::Estimate;
 use crate::grid::Grid;
 use crate::model_in_condition::ModelInCondition;
 use crate::significance::{ALPHA, holm};
 use darkqa_ground::types::degradations::Kind;
-use darkqa_ground::types::{AxisLevel, EnhancerName, Family, ReadingName, RunGroup, Variant, View};
+use darkqa_ground::types::{AxisLevel, EnhancerName, Family, ProfileName, RunGroup, Variant, View};
 
 /// A claim about noise that may hold under one noise profile and not under another.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
@@ -148,7 +148,7 @@ impl Robustness {
 #[derive(Debug, Clone, PartialEq)]
 pub struct EffectInProfile {
     /// Noise profile.
-    pub profile: ReadingName,
+    pub profile: ProfileName,
     /// Accuracy of the first side minus that of the second, averaged over the levels; `n` is the number of items. `None` if a side was
     /// not asked.
     pub effect: Option<TestedEffect>,
@@ -191,13 +191,13 @@ pub struct FindingByProfile {
 /// Tests all claims of each model under every noise profile; empty if the grid has fewer than two profiles.
 #[must_use]
 pub(crate) fn by_profile(grid: &Grid<'_>) -> Vec<FindingByProfile> {
-    let profiles: BTreeSet<&ReadingName> = noisy_subjects(grid)
+    let profiles: BTreeSet<&ProfileName> = noisy_subjects(grid)
         .filter_map(|subject| subject.variant.reading.as_ref())
         .collect();
     if profiles.len() < 2 {
         return Vec::new();
     }
-    let profiles: Vec<&ReadingName> = profiles.into_iter().collect();
+    let profiles: Vec<&ProfileName> = profiles.into_iter().collect();
     let models: BTreeSet<(&str, Option<&RunGroup>)> = noisy_subjects(grid)
         .map(|subject| (&*subject.model, subject.variant.group.as_ref()))
         .collect();
@@ -224,7 +224,7 @@ pub(crate) fn by_profile(grid: &Grid<'_>) -> Vec<FindingByProfile> {
 /// Subjects with noisy images.
 fn noisy_subjects<'g>(grid: &'g Grid<'_>) -> impl Iterator<Item = &'g ModelInCondition> {
     grid.subjects.iter().filter(|subject| {
-        subject.view == Some(View::Image) && subject.variant.kind.is_some_and(Kind::has_readings)
+        subject.view == Some(View::Image) && subject.variant.kind.is_some_and(Kind::has_profiles)
     })
 }
 
@@ -270,7 +270,7 @@ impl SideLookup<'_, '_> {
         &self,
         claim: &NoiseHypothesis,
         level: AxisLevel,
-        profile: &ReadingName,
+        profile: &ProfileName,
     ) -> Option<(usize, usize)> {
         let noisy = Variant {
             kind: Some(Kind::Sensor),
@@ -330,7 +330,7 @@ impl SideLookup<'_, '_> {
 fn finding(
     lookup: &SideLookup<'_, '_>,
     claim: NoiseHypothesis,
-    profiles: &[&ReadingName],
+    profiles: &[&ProfileName],
 ) -> Option<FindingByProfile> {
     let levels: Vec<AxisLevel> = profiles
         .iter()
@@ -384,7 +384,7 @@ fn finding(
 fn asked_levels(
     lookup: &SideLookup<'_, '_>,
     claim: &NoiseHypothesis,
-    profile: &ReadingName,
+    profile: &ProfileName,
 ) -> BTreeSet<AxisLevel> {
     claim
         .levels()
@@ -437,7 +437,7 @@ fn effect(grid: &Grid<'_>, pairs: &[(usize, usize)], kept: &[usize]) -> Option<T
             .iter()
             .map(|(first, second)| {
                 let [first, second] = [first, second].map(|subject| {
-                    let reading = grid.result(*subject, index).reading(ReadingMode::Strict);
+                    let reading = grid.result(*subject, index).reading(ParsingMode::Strict);
                     i64::from(reading.is_some_and(|chosen| item.is_right(chosen)))
                 });
                 first - second

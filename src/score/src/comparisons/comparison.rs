@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::claim::{Claim, ParsedFinding};
 use super::holm_of;
 use super::paired::PairedComparison;
-use crate::choice::ReadingMode;
+use crate::choice::ParsingMode;
 use crate::grid::Grid;
 use crate::model_in_condition::{ModelInCondition, models_under_test};
 use crate::significance::{Significance, least_p};
@@ -130,10 +130,10 @@ impl Comparison {
 
     /// Comparison in a parsing.
     #[must_use]
-    pub fn parsed(&self, mode: ReadingMode) -> &TestedComparison {
+    pub fn parsed(&self, mode: ParsingMode) -> &TestedComparison {
         match mode {
-            ReadingMode::Strict => &self.strict,
-            ReadingMode::Lenient => &self.lenient,
+            ParsingMode::Strict => &self.strict,
+            ParsingMode::Lenient => &self.lenient,
         }
     }
 }
@@ -170,10 +170,10 @@ type Job<'a> = (ComparisonKind, Option<&'a Family>, usize, usize);
 fn uncorrected(grid: &Grid<'_>, jobs: Vec<Job<'_>>) -> Vec<Comparison> {
     jobs.into_par_iter()
         .filter_map(|(kind, family, first, second)| {
-            let strict = PairedComparison::new(grid, first, second, family, ReadingMode::Strict)?;
+            let strict = PairedComparison::new(grid, first, second, family, ParsingMode::Strict)?;
             let differs = grid.parsings_differ(first) || grid.parsings_differ(second);
             let lenient = if differs {
-                PairedComparison::new(grid, first, second, family, ReadingMode::Lenient)?
+                PairedComparison::new(grid, first, second, family, ParsingMode::Lenient)?
             } else {
                 strict.clone()
             };
@@ -358,8 +358,8 @@ fn later_lights(grid: &Grid<'_>, index: usize) -> Vec<usize> {
 fn is_other_light(one: &ModelInCondition, other: &ModelInCondition) -> bool {
     (one.view, one.level) == (other.view, other.level)
         && (one.variant.kind, &one.enhancer) == (other.variant.kind, &other.enhancer)
-        && one.variant.pair.as_ref().map(PairDark::without_reading)
-            == other.variant.pair.as_ref().map(PairDark::without_reading)
+        && one.variant.pair.as_ref().map(PairDark::without_profile)
+            == other.variant.pair.as_ref().map(PairDark::without_profile)
         && one.variant != other.variant
 }
 

@@ -1,6 +1,6 @@
 //! Comparison of two subjects on the same items: [`PairedComparison`].
 
-use crate::choice::ReadingMode;
+use crate::choice::ParsingMode;
 use crate::estimate::Estimate;
 use crate::grid::{Grid, GridItem};
 use crate::significance::{ALPHA, SwapMethod, mcnemar, swap_test};
@@ -47,7 +47,7 @@ impl PairedComparison {
         first: usize,
         second: usize,
         family: Option<&Family>,
-        mode: ReadingMode,
+        mode: ParsingMode,
     ) -> Option<Self> {
         Self::on_items(grid, first, second, mode, |_, item| {
             item.is_in_family(family)
@@ -59,7 +59,7 @@ impl PairedComparison {
         grid: &Grid<'_>,
         first: usize,
         second: usize,
-        mode: ReadingMode,
+        mode: ParsingMode,
         has: impl Fn(usize, &GridItem<'_>) -> bool,
     ) -> Option<Self> {
         Self::counting(grid, [first, second], mode, has, |item, chosen| {
@@ -71,7 +71,7 @@ impl PairedComparison {
     pub(crate) fn counting(
         grid: &Grid<'_>,
         [first, second]: [usize; 2],
-        mode: ReadingMode,
+        mode: ParsingMode,
         has: impl Fn(usize, &GridItem<'_>) -> bool,
         counts: impl Fn(&GridItem<'_>, Option<u8>) -> bool,
     ) -> Option<Self> {

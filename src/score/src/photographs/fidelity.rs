@@ -3,7 +3,7 @@
 use crate::photographs::dot;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use crate::choice::ReadingMode;
+use crate::choice::ParsingMode;
 use crate::grid::Grid;
 use crate::model_in_condition::{ModelInCondition, pooled_models};
 use crate::significance::{Significance, holm};
@@ -160,7 +160,7 @@ impl<'a> ConditionSums<'a> {
         for &subject in subjects {
             let mut strata = BTreeMap::<&Family, [Vec<RankedReply>; 2]>::new();
             for (index, item) in grid.items.iter().enumerate() {
-                let reading = grid.result(subject, index).reading(ReadingMode::Strict);
+                let reading = grid.result(subject, index).reading(ParsingMode::Strict);
                 let image = grid.trial(subject, index).and_then(|trial| {
                     let image = trial.images()?;
                     Some((trial.frame(), image.first))

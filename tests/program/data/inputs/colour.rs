@@ -9,9 +9,9 @@ use crate::support::image_files::{
 };
 use crate::support::run::{Bench, words};
 use crate::support::tiff_files::{Order, Page, tiff};
+use darkqa_picture::DecodeRule;
 use darkqa_picture::ImageFile;
-use darkqa_picture::ReadingRule;
-use darkqa_picture::reading_rule::ColourRule;
+use darkqa_picture::decode_rule::ColourRule;
 use image::{Rgb, RgbImage};
 use serde_json::{Value, json};
 
@@ -86,9 +86,9 @@ fn image() -> RgbImage {
 }
 
 fn file(bytes: Vec<u8>, colour: ColourRule) -> ImageFile {
-    let rule = ReadingRule {
+    let rule = DecodeRule {
         colour,
-        ..ReadingRule::default()
+        ..DecodeRule::default()
     };
     ImageFile::new(bytes, "a file".to_owned(), rule)
 }

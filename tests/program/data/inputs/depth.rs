@@ -8,9 +8,9 @@ use crate::support::run::{Bench, words};
 use crate::support::tiff_files::{Order, Page, tiff};
 use darkqa_ground::types::{Pixels, Severity};
 use darkqa_light::exposure::expose;
+use darkqa_picture::DecodeRule;
 use darkqa_picture::ImageFile;
-use darkqa_picture::ReadingRule;
-use darkqa_picture::reading_rule::Transfer;
+use darkqa_picture::decode_rule::Transfer;
 use image::{ImageBuffer, Rgb, RgbImage};
 use serde_json::Value;
 
@@ -40,13 +40,13 @@ fn tiff_of(order: Order, image: &Image16) -> Vec<u8> {
 }
 
 fn file(bytes: Vec<u8>) -> ImageFile {
-    ImageFile::new(bytes, "a file".to_owned(), ReadingRule::default())
+    ImageFile::new(bytes, "a file".to_owned(), DecodeRule::default())
 }
 
 fn linear(bytes: Vec<u8>) -> ImageFile {
-    let rule = ReadingRule {
+    let rule = DecodeRule {
         transfer: Transfer::Linear,
-        ..ReadingRule::default()
+        ..DecodeRule::default()
     };
     ImageFile::new(bytes, "a file".to_owned(), rule)
 }

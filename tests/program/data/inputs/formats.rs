@@ -2,8 +2,8 @@
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
+use darkqa_picture::DecodeRule;
 use darkqa_picture::ImageFile;
-use darkqa_picture::ReadingRule;
 use image::{ImageFormat, Rgb, RgbImage};
 use serde_json::json;
 
@@ -18,7 +18,7 @@ fn image() -> RgbImage {
 }
 
 fn file(bytes: Vec<u8>) -> ImageFile {
-    ImageFile::new(bytes, "a file".to_owned(), ReadingRule::default())
+    ImageFile::new(bytes, "a file".to_owned(), DecodeRule::default())
 }
 
 fn decoded(bytes: Vec<u8>) -> RgbImage {
@@ -234,9 +234,9 @@ fn a_bomb_is_refused_before_it_is_decompressed() {
             "{error}"
         );
     }
-    let rule = ReadingRule {
+    let rule = DecodeRule {
         max_pixels: 27,
-        ..ReadingRule::default()
+        ..DecodeRule::default()
     };
     let limited = |bytes| ImageFile::new(bytes, "a file".to_owned(), rule).check();
     for format in [ImageFormat::WebP, ImageFormat::Tiff] {

@@ -10,9 +10,9 @@ use darkqa_ground::types::{FrameId, Light, Pixels, Severity};
 use darkqa_light::exposure::expose;
 use darkqa_light::raw::negative::Negative;
 use darkqa_light::{CameraModel, NoiseKey, NoiseProfile, Synthesis};
+use darkqa_picture::DecodeRule;
 use darkqa_picture::ImageFile;
-use darkqa_picture::ReadingRule;
-use darkqa_picture::reading_rule::ColourRule;
+use darkqa_picture::decode_rule::ColourRule;
 use exr::prelude::{Compression, FlatSamples, f16};
 use image::RgbImage;
 use serde_json::Value;
@@ -25,7 +25,7 @@ fn lights() -> Vec<f32> {
 }
 
 fn file(bytes: Vec<u8>) -> ImageFile {
-    ImageFile::new(bytes, "a file".to_owned(), ReadingRule::default())
+    ImageFile::new(bytes, "a file".to_owned(), DecodeRule::default())
 }
 
 fn light(file: &ImageFile) -> Vec<f32> {
@@ -221,9 +221,9 @@ fn what_is_no_light_is_refused_by_name() {
         let error = file(whole[..length].to_vec()).decode().unwrap_err();
         assert!(error.to_string().contains("not a"), "{length}: {error}");
     }
-    let rule = ReadingRule {
+    let rule = DecodeRule {
         max_pixels: 48 * 32 - 1,
-        ..ReadingRule::default()
+        ..DecodeRule::default()
     };
     let error = ImageFile::new(whole, "a file".to_owned(), rule).decode();
     assert!(
@@ -267,9 +267,9 @@ fn other_primaries_are_converted() {
     let same = file(with_primaries([3, 1], &stated, Some(BT709)));
     assert_eq!(light(&same), stated);
     assert_eq!(same.note().colour, None);
-    let rule = ReadingRule {
+    let rule = DecodeRule {
         colour: ColourRule::Ignore,
-        ..ReadingRule::default()
+        ..DecodeRule::default()
     };
     let ignoring = ImageFile::new(wide, "a file".to_owned(), rule);
     assert_eq!(light(&ignoring), stated);

@@ -4,8 +4,8 @@ use std::fs;
 
 use crate::support::image_files::{exif, jpeg, png, seen, turned_jpeg, turned_png};
 use crate::support::run::{Bench, records, words};
+use darkqa_picture::DecodeRule;
 use darkqa_picture::ImageFile;
-use darkqa_picture::ReadingRule;
 use image::{Rgb, RgbImage};
 use serde_json::{Value, json};
 
@@ -15,7 +15,7 @@ fn image() -> RgbImage {
 }
 
 fn file(bytes: Vec<u8>) -> ImageFile {
-    ImageFile::new(bytes, "a file".to_owned(), ReadingRule::default())
+    ImageFile::new(bytes, "a file".to_owned(), DecodeRule::default())
 }
 
 #[test]

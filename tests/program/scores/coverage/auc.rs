@@ -3,7 +3,7 @@
 use super::*;
 use crate::support::made::record;
 use darkqa_ground::types::{
-    AnswerReading, Condition, Digest, Family, ImageFacts, ImageFidelity, Record,
+    Condition, Digest, Family, ImageFacts, ImageFidelity, ParsedAnswer, Record,
 };
 use darkqa_score::cluster::Clusters;
 use darkqa_score::cluster::FrameTies;
@@ -201,7 +201,7 @@ impl MadeRun {
                 Shared::Effects(_) => random.random(),
             };
             let chosen = Some(usize::from(luck >= logistic(logit)));
-            record.detail.strict = Some(AnswerReading { chosen, why: None });
+            record.detail.strict = Some(ParsedAnswer { chosen, why: None });
         }
     }
 }

@@ -3,8 +3,8 @@
 use super::*;
 use crate::support::made::record;
 use darkqa_eval::Kind;
-use darkqa_ground::types::{AnswerReading, Condition, Degradation, Record, Severity};
-use darkqa_score::choice::ReadingMode;
+use darkqa_ground::types::{Condition, Degradation, ParsedAnswer, Record, Severity};
+use darkqa_score::choice::ParsingMode;
 use darkqa_score::cluster::Clusters;
 use darkqa_score::cluster::FrameTies;
 use darkqa_score::comparisons::paired::PairedComparison;
@@ -88,7 +88,7 @@ fn pooled_rates(design: &PooledDesign, runs: usize) -> PooledRates {
         };
         let finding = findings.iter().find(all).unwrap();
         // The subjects are sorted: exposure drop of the first model, then its noise.
-        let one = PairedComparison::new(&grid, 1, 0, None, ReadingMode::Strict).unwrap();
+        let one = PairedComparison::new(&grid, 1, 0, None, ParsingMode::Strict).unwrap();
         rates.rejected += f64::from(u8::from(finding.strict.p < 0.05));
         rates.rejected_by_one += f64::from(u8::from(one.p < 0.05));
         rates.held += f64::from(u8::from(holds(finding.strict.difference, -design.effect)));
@@ -125,7 +125,7 @@ fn answer(random: &mut StdRng, records: &mut [Record], clusters: &[usize], desig
         let p = 1.0 / (1.0 + (-logit).exp()) - if side == 0 { effect } else { 0.0 };
         let right = random.random_bool(p.clamp(0.0, 1.0));
         let chosen = Some(usize::from(!right));
-        record.detail.strict = Some(AnswerReading { chosen, why: None });
+        record.detail.strict = Some(ParsedAnswer { chosen, why: None });
     }
 }
 

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::fmt;
 
-use super::degradation::{Degradation, Kind, ReadingName};
+use super::degradation::{Degradation, Kind, ProfileName};
 use super::pair_dark::{PairDark, PhotoName};
 use super::run_group::RunGroup;
 use super::severity::{Axis, Severity};
@@ -105,7 +105,7 @@ pub struct Variant {
     /// The kind; `None` for untouched frames and pairs.
     pub kind: Option<Kind>,
     /// The noise profile; `None` if the kind has none.
-    pub reading: Option<ReadingName>,
+    pub reading: Option<ProfileName>,
     /// The runs with these images, in a report on runs whose images differ; otherwise `None`.
     pub group: Option<RunGroup>,
 }
@@ -163,15 +163,15 @@ impl Variant {
             return pair.title();
         }
         let kind = self.kind.map_or("untouched", Kind::title);
-        self.unusual_reading()
+        self.unusual_profile()
             .map_or(kind.to_owned(), |reading| format!("{kind} @{reading}"))
     }
 
     /// The kind's word, or the name of a pair's darkness, with the noise profile if it is not the paper's, as `noise@eld`; without the
     /// group of runs.
     #[must_use]
-    pub fn kind_and_reading(&self) -> String {
-        match self.unusual_reading() {
+    pub fn kind_and_profile(&self) -> String {
+        match self.unusual_profile() {
             None => self.word().into_owned(),
             Some(reading) => format!("{}@{reading}", self.word()),
         }
@@ -186,10 +186,10 @@ impl Variant {
     }
 
     /// The noise profile, unless it is the paper's.
-    fn unusual_reading(&self) -> Option<&ReadingName> {
+    fn unusual_profile(&self) -> Option<&ProfileName> {
         self.reading
             .as_ref()
-            .filter(|name| **name != ReadingName::PAPER)
+            .filter(|name| **name != ProfileName::PAPER)
     }
 }
 
@@ -215,7 +215,7 @@ impl From<&Treatment> for Variant {
 impl fmt::Display for Variant {
     /// `none`, `ev`, `noise`, `noise@eld` or `noise @RUN`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(&(self.kind_and_reading() + &self.group_suffix()))
+        f.pad(&(self.kind_and_profile() + &self.group_suffix()))
     }
 }
 

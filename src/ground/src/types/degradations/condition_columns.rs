@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::degradation::{Degradation, ReadingName};
+use super::degradation::{Degradation, ProfileName};
 use super::severity::{Axis, Severity};
 use crate::types::{AxisLevel, Condition, EnhancerName, PairDark};
 
@@ -21,7 +21,7 @@ pub struct ConditionColumns<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub severity: Option<Severity>,
     /// The noise profile.
-    pub reading: Option<&'a ReadingName>,
+    pub reading: Option<&'a ProfileName>,
     /// The enhancer; `None` for a raw image.
     pub enhancer: Option<&'a EnhancerName>,
 }

@@ -18,7 +18,7 @@ use crate::types::text::words::written_as_text;
 pub struct Degradation {
     severity: Severity,
     kind: Kind,
-    reading: Option<ReadingName>,
+    reading: Option<ProfileName>,
 }
 
 impl Degradation {
@@ -29,7 +29,7 @@ impl Degradation {
     pub fn new(
         kind: Kind,
         severity: Severity,
-        reading: Option<ReadingName>,
+        reading: Option<ProfileName>,
     ) -> Result<Self, Error> {
         if severity > kind.max_severity() {
             let problem = format_args!(
@@ -41,7 +41,7 @@ impl Degradation {
             );
             return Err(Error::usage("condition", problem));
         }
-        if let Some(reading) = reading.as_ref().filter(|_| !kind.has_readings()) {
+        if let Some(reading) = reading.as_ref().filter(|_| !kind.has_profiles()) {
             let problem = format_args!(
                 "{}-{kind}@{reading}: {kind} has no noise profiles; write {}-{kind}",
                 kind.label(severity),
@@ -49,7 +49,7 @@ impl Degradation {
             );
             return Err(Error::usage("condition", problem));
         }
-        let reading = reading.or_else(|| kind.has_readings().then_some(ReadingName::PAPER));
+        let reading = reading.or_else(|| kind.has_profiles().then_some(ProfileName::PAPER));
         Ok(Self {
             severity,
             kind,
@@ -71,7 +71,7 @@ impl Degradation {
 
     /// The noise profile; `None` if the kind has none.
     #[must_use]
-    pub fn reading(&self) -> Option<&ReadingName> {
+    pub fn reading(&self) -> Option<&ProfileName> {
         self.reading.as_ref()
     }
 
@@ -107,7 +107,7 @@ impl fmt::Display for Degradation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}-{}", self.label(), self.kind)?;
         match &self.reading {
-            Some(reading) if *reading != ReadingName::PAPER => write!(f, "@{reading}"),
+            Some(reading) if *reading != ProfileName::PAPER => write!(f, "@{reading}"),
             _ => Ok(()),
         }
     }
@@ -119,7 +119,7 @@ impl FromStr for Degradation {
     fn from_str(text: &str) -> Result<Self, Error> {
         let (plain, reading) = match text.split_once('@') {
             None => (text, None),
-            Some((plain, reading)) => (plain, Some(ReadingName::new(reading)?)),
+            Some((plain, reading)) => (plain, Some(ProfileName::new(reading)?)),
         };
         let (label, word) = plain
             .split_once('-')
@@ -130,7 +130,7 @@ impl FromStr for Degradation {
                 format_args!("no kind of degradation is named {word:?}"),
             )
         })?;
-        if reading == Some(ReadingName::PAPER) {
+        if reading == Some(ProfileName::PAPER) {
             let problem = "the reading paper is written without its name";
             return Err(syntax_error(text, problem));
         }
@@ -224,7 +224,7 @@ impl Kind {
 
     /// True if the kind has noise profiles: several readings of the paper's noise model.
     #[must_use]
-    pub fn has_readings(self) -> bool {
+    pub fn has_profiles(self) -> bool {
         self == Self::Sensor
     }
 
@@ -361,9 +361,9 @@ written_as_text!(Kind);
 
 /// The name of a noise profile: letters, digits, `_`, `.` and `-`.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize)]
-pub struct ReadingName(Cow<'static, str>);
+pub struct ProfileName(Cow<'static, str>);
 
-impl ReadingName {
+impl ProfileName {
     /// The paper's noise model exactly as printed. Conditions are written without this name.
     pub const PAPER: Self = Self(Cow::Borrowed("paper"));
     /// Settings that match no named noise profile.
@@ -404,7 +404,7 @@ impl ReadingName {
     }
 }
 
-impl Ord for ReadingName {
+impl Ord for ProfileName {
     /// `paper` first, then in alphabetical order.
     fn cmp(&self, other: &Self) -> Ordering {
         let [one, two] = [self, other].map(|name| (*name != Self::PAPER, &name.0));
@@ -412,19 +412,19 @@ impl Ord for ReadingName {
     }
 }
 
-impl PartialOrd for ReadingName {
+impl PartialOrd for ProfileName {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
 }
 
-impl fmt::Display for ReadingName {
+impl fmt::Display for ProfileName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(&self.0)
     }
 }
 
-impl<'de> Deserialize<'de> for ReadingName {
+impl<'de> Deserialize<'de> for ProfileName {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         Self::new(&String::deserialize(deserializer)?).map_err(serde::de::Error::custom)
     }

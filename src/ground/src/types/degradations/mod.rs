@@ -17,7 +17,7 @@ mod treatment_set;
 pub use axis_level::{AxisLevel, Variant};
 pub use condition::{Condition, EnhancerName};
 pub use condition_columns::ConditionColumns;
-pub use degradation::{Degradation, Kind, ReadingName};
+pub use degradation::{Degradation, Kind, ProfileName};
 pub use exposure_facts::ExposureFacts;
 pub use kind_set::KindSet;
 pub use pair_dark::{PairDark, PhotoName};

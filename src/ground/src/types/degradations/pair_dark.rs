@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Deserializer, Serialize};
 
-use super::degradation::{Kind, ReadingName};
+use super::degradation::{Kind, ProfileName};
 use crate::error::Error;
 use crate::types::text::words::written_as_text;
 
@@ -85,7 +85,7 @@ impl<'de> Deserialize<'de> for PhotoName {
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum PairDark {
     /// A synthetic image of the frame with the exposure drop of its photograph: the kind, and the noise profile if the kind has several.
-    Match(Kind, Option<ReadingName>),
+    Match(Kind, Option<ProfileName>),
     /// A photograph of the same scene in the dark, without synthesis.
     Photograph(PhotoName),
 }
@@ -111,7 +111,7 @@ impl PairDark {
 
     /// The noise profile of synthesis; `None` for a photograph, and for kinds without noise profiles.
     #[must_use]
-    pub fn reading(&self) -> Option<&ReadingName> {
+    pub fn reading(&self) -> Option<&ProfileName> {
         match self {
             Self::Match(_, reading) => reading.as_ref(),
             Self::Photograph(_) => None,
@@ -120,7 +120,7 @@ impl PairDark {
 
     /// Drops the noise profile: photographs of one name, or synthetic images of one kind, are compared across noise profiles.
     #[must_use]
-    pub fn without_reading(&self) -> Self {
+    pub fn without_profile(&self) -> Self {
         match self {
             Self::Photograph(name) => Self::Photograph(name.clone()),
             Self::Match(kind, _) => Self::Match(*kind, None),
@@ -135,7 +135,7 @@ impl PairDark {
             Self::Match(kind, reading) => {
                 let reading = reading
                     .as_ref()
-                    .filter(|name| **name != ReadingName::PAPER)
+                    .filter(|name| **name != ProfileName::PAPER)
                     .map_or(String::new(), |name| format!(" @{name}"));
                 format!("{}{reading} (as dark as real)", kind.title())
             }
@@ -151,7 +151,7 @@ impl fmt::Display for PairDark {
             Self::Match(kind, reading) => {
                 let reading = reading
                     .as_ref()
-                    .filter(|name| **name != ReadingName::PAPER)
+                    .filter(|name| **name != ProfileName::PAPER)
                     .map_or(String::new(), |name| format!("@{name}"));
                 f.pad(&format!("{MATCH}-{kind}{reading}"))
             }
@@ -170,23 +170,23 @@ impl FromStr for PairDark {
         };
         let (word, reading) = match kind.split_once('@') {
             None => (kind, None),
-            Some((kind, reading)) => (kind, Some(ReadingName::new(reading)?)),
+            Some((kind, reading)) => (kind, Some(ProfileName::new(reading)?)),
         };
         let kind = Kind::from_word(word)
             .filter(|kind| kind.can_match())
             .ok_or_else(|| {
                 match_error(text, "the forms are match-ev, match-noise and match-auto")
             })?;
-        if reading.is_some() && !kind.has_readings() {
+        if reading.is_some() && !kind.has_profiles() {
             return Err(match_error(text, "this kind has no noise profiles"));
         }
-        if reading == Some(ReadingName::PAPER) {
+        if reading == Some(ProfileName::PAPER) {
             return Err(match_error(
                 text,
                 "the reading paper is written without its name",
             ));
         }
-        let reading = reading.or_else(|| kind.has_readings().then_some(ReadingName::PAPER));
+        let reading = reading.or_else(|| kind.has_profiles().then_some(ProfileName::PAPER));
         Ok(Self::Match(kind, reading))
     }
 }

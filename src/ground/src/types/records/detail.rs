@@ -92,9 +92,9 @@ details! {
         #[serde(default, skip_serializing_if = "is_first")]
         repeat: u32,
         /// The strict parsing of the reply; `None` if no reply came.
-        strict: Option<AnswerReading>,
+        strict: Option<ParsedAnswer>,
         /// The lenient parsing of the reply; `None` if no reply came.
-        lenient: Option<AnswerReading>,
+        lenient: Option<ParsedAnswer>,
         /// How the trial ended.
         outcome: TrialOutcome,
         /// The image as it was sent, or the first of several.
@@ -210,14 +210,14 @@ pub enum TrialOutcome {
 
 /// The answer that the strict or the lenient parsing finds in a reply.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct AnswerReading {
+pub struct ParsedAnswer {
     /// The index of the choice; `None` if the parsing found none.
     pub chosen: Option<usize>,
     /// The reason why the parsing found no choice; `None` if it found one.
     pub why: Option<UnreadReason>,
 }
 
-impl From<Answer> for AnswerReading {
+impl From<Answer> for ParsedAnswer {
     fn from(answer: Answer) -> Self {
         match answer {
             Answer::Chosen(index) => Self {

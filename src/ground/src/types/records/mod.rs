@@ -9,7 +9,7 @@ mod trial_key;
 mod trials;
 
 pub use detail::{
-    AnswerReading, ChoiceDetail, ImageFacts, OpenDetail, Step, TrialOutcome, WalkFacts,
+    ChoiceDetail, ImageFacts, OpenDetail, ParsedAnswer, Step, TrialOutcome, WalkFacts,
 };
 pub use image_notes::{ImageFidelity, ObjectCrop, Thumbnail};
 pub use record::{Failure, FailureKind, Record, StoredDetail, Via, View};

@@ -60,7 +60,7 @@ fn strict<'s>(score: &'s StrictScore, condition: &str) -> &'s GroupCell {
         .iter()
         .find(|cell| {
             cell.family.is_none()
-                && cell.mode == ReadingMode::Strict
+                && cell.mode == ParsingMode::Strict
                 && cell.subject.condition() == condition
         })
         .unwrap()

@@ -1,6 +1,6 @@
 //! One pooled difference and its tests: [`PooledFinding`].
 
-use crate::choice::ReadingMode;
+use crate::choice::ParsingMode;
 use crate::comparisons::claim::{Claim, ParsedFinding};
 use crate::comparisons::pooled_kind::PooledKind;
 use crate::estimate::{Estimate, largest};
@@ -94,19 +94,19 @@ impl PooledFinding {
         is_severe(self.level, self.variant.kind)
     }
 
-    pub(crate) fn set_p_report(&mut self, mode: ReadingMode, p: Option<f64>) {
+    pub(crate) fn set_p_report(&mut self, mode: ParsingMode, p: Option<f64>) {
         match mode {
-            ReadingMode::Strict => self.strict.p_report = p,
-            ReadingMode::Lenient => self.lenient.p_report = p,
+            ParsingMode::Strict => self.strict.p_report = p,
+            ParsingMode::Lenient => self.lenient.p_report = p,
         }
     }
 
     /// Difference in a parsing.
     #[must_use]
-    pub fn parsed(&self, mode: ReadingMode) -> &PooledDifference {
+    pub fn parsed(&self, mode: ParsingMode) -> &PooledDifference {
         match mode {
-            ReadingMode::Strict => &self.strict,
-            ReadingMode::Lenient => &self.lenient,
+            ParsingMode::Strict => &self.strict,
+            ParsingMode::Lenient => &self.lenient,
         }
     }
 }

@@ -9,7 +9,7 @@ use super::kappa::kappa;
 use super::light::{is_cannot_tell, is_refused};
 use super::question_in_light::QuestionInLight;
 use crate::bootstrap::Resamples;
-use crate::choice::ReadingMode;
+use crate::choice::ParsingMode;
 use crate::estimate::ClusterCount;
 use crate::estimate::Estimate;
 use crate::grid::{Grid, TrialResult};
@@ -23,7 +23,7 @@ pub struct AgreementCell {
     /// Question family; `None` for all families together.
     pub family: Option<Family>,
     /// Parsing of the replies.
-    pub mode: ReadingMode,
+    pub mode: ParsingMode,
     /// Share of the replies with the same answer as at L0, over questions with an answer at L0. An unreadable reply counts as a
     /// disagreement. `None` without a reply.
     pub agreement: Option<Estimate>,
@@ -81,7 +81,7 @@ pub(super) fn cells(
     draws: &Resamples,
     bank: &BankIndex<'_>,
     questions: &[QuestionInLight],
-    mode: ReadingMode,
+    mode: ParsingMode,
 ) -> Vec<AgreementCell> {
     let informative: BTreeSet<usize> = questions
         .iter()
@@ -127,7 +127,7 @@ struct CellItems<'g, 'r> {
     grid: &'g Grid<'r>,
     subject: usize,
     family: Option<&'g Family>,
-    mode: ReadingMode,
+    mode: ParsingMode,
 }
 
 impl CellItems<'_, '_> {

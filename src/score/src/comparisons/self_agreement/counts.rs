@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::bank_index::BankIndex;
 use super::question_in_light::entropy;
-use crate::choice::ReadingMode;
+use crate::choice::ParsingMode;
 use crate::grid::Grid;
 use darkqa_ground::types::Family;
 
@@ -32,7 +32,7 @@ impl<'g> BankCounts<'g> {
         grid: &'g Grid<'_>,
         subject: usize,
         family: Option<&Family>,
-        mode: ReadingMode,
+        mode: ParsingMode,
         bank: &BankIndex<'_>,
     ) -> Self {
         let mut counts = Self {

@@ -3,7 +3,7 @@
 
 use crate::accuracies::CurvePoints;
 use crate::bootstrap::Resamples;
-use crate::choice::ReadingMode;
+use crate::choice::ParsingMode;
 use crate::estimate::ClusterCount;
 use crate::estimate::Estimate;
 use crate::grid::Grid;
@@ -48,7 +48,7 @@ impl Bounds {
         grid: &Grid<'_>,
         subject: &ModelInCondition,
         family: Option<&Family>,
-        mode: ReadingMode,
+        mode: ParsingMode,
         draws: &Resamples,
     ) -> Result<Self, NoEvidence> {
         let light =
@@ -151,7 +151,7 @@ pub struct EvidenceCurve {
 /// Computes the curves of a model over all families, in the strict parsing. The agreement falls from the ceiling at L0; half of the
 /// evidence is lost half-way between ceiling and floor. The threshold is computed as in other reports, with the floor in place of chance.
 pub(super) fn curves(grid: &Grid<'_>, draws: &Resamples) -> Vec<EvidenceCurve> {
-    let mode = ReadingMode::Strict;
+    let mode = ParsingMode::Strict;
     CurvePoints::all(grid)
         .into_iter()
         .filter_map(|points| {

@@ -2,7 +2,7 @@
 
 use std::collections::{HashMap, HashSet};
 
-use crate::choice::ReadingMode;
+use crate::choice::ParsingMode;
 use crate::estimate::Estimate;
 use darkqa_ground::types::questions::CANNOT_TELL;
 use darkqa_ground::types::{
@@ -23,7 +23,7 @@ pub(super) struct LightAnswers<'a> {
 pub struct LightReplies {
     pub model: String,
     /// Parsing of the replies.
-    pub mode: ReadingMode,
+    pub mode: ParsingMode,
     /// Number of questions about images that were asked at L0.
     pub asked: usize,
     /// Share of readable replies; `None` without a reply. Its `n` is the number of replies.
@@ -59,10 +59,10 @@ fn is_untouched(condition: &Condition) -> bool {
 }
 
 /// Index of the choice parsed from the reply of a trial; `None` if no choice could be parsed.
-pub(super) fn chosen(trial: TrialRef<'_>, mode: ReadingMode) -> Option<usize> {
+pub(super) fn chosen(trial: TrialRef<'_>, mode: ParsingMode) -> Option<usize> {
     let reading = match mode {
-        ReadingMode::Strict => trial.strict(),
-        ReadingMode::Lenient => trial.lenient(),
+        ParsingMode::Strict => trial.strict(),
+        ParsingMode::Lenient => trial.lenient(),
     };
     reading?.chosen
 }
@@ -101,7 +101,7 @@ impl<'a> LightAnswers<'a> {
     }
 
     /// Choice of the model at L0 for the question of a trial; `None` if it is unreadable or missing.
-    fn reference(&self, trial: TrialRef<'_>, mode: ReadingMode) -> Option<usize> {
+    fn reference(&self, trial: TrialRef<'_>, mode: ParsingMode) -> Option<usize> {
         let key = (trial.question(), trial.choices());
         let own = run_group(trial);
         let light = self
@@ -119,7 +119,7 @@ impl<'a> LightAnswers<'a> {
     pub(super) fn scored_against_light(
         &self,
         trials: &'a Trials<ChoiceDetail>,
-        mode: ReadingMode,
+        mode: ParsingMode,
     ) -> Trials<ChoiceDetail> {
         let scored = trials
             .iter()
@@ -140,7 +140,7 @@ impl<'a> LightAnswers<'a> {
         &self,
         trials: &'a Trials<ChoiceDetail>,
         other: &str,
-        mode: ReadingMode,
+        mode: ParsingMode,
     ) -> Trials<ChoiceDetail> {
         let scored = trials
             .iter()
@@ -152,7 +152,7 @@ impl<'a> LightAnswers<'a> {
     }
 
     /// Counts the replies at L0, in one parsing.
-    pub(super) fn replies(&self, mode: ReadingMode) -> LightReplies {
+    pub(super) fn replies(&self, mode: ParsingMode) -> LightReplies {
         let replied: Vec<TrialRef<'_>> = self.first().filter(|trial| !trial.failed()).collect();
         let read = replied
             .iter()

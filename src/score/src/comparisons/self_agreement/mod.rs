@@ -37,7 +37,7 @@ use super::comparison::{Comparison, ComparisonKind, comparisons};
 use crate::accuracies::{Health, healths};
 use crate::answers::confusion::{Confusion, Hallucination, confusions, hallucinations};
 use crate::bootstrap::Resamples;
-use crate::choice::ReadingMode;
+use crate::choice::ParsingMode;
 use crate::cluster::{ClusterUnit, Clusters, FrameTies};
 use crate::grid::Grid;
 use crate::photographs::PhotographedSet;
@@ -108,7 +108,7 @@ impl<'a> SelfAgreement<'a> {
         };
         for model in &models {
             let answers = LightAnswers::new(trials, model);
-            for mode in ReadingMode::ALL {
+            for mode in ParsingMode::ALL {
                 let replies = answers.replies(mode);
                 let scored = answers.scored_against_light(trials, mode);
                 let grid = Grid::new(&scored, &clusters);
@@ -116,7 +116,7 @@ impl<'a> SelfAgreement<'a> {
                 all.cells
                     .extend(cells(&grid, &draws, &bank, &questions, mode));
                 all.light.push(replies);
-                if mode == ReadingMode::Strict {
+                if mode == ParsingMode::Strict {
                     let found = comparisons(&grid);
                     all.comparisons.extend(
                         found
@@ -147,7 +147,7 @@ impl<'a> SelfAgreement<'a> {
     pub fn models(&self) -> Vec<&str> {
         self.light
             .iter()
-            .filter(|light| light.mode == ReadingMode::Strict)
+            .filter(|light| light.mode == ParsingMode::Strict)
             .map(|light| &*light.model)
             .collect()
     }
@@ -165,14 +165,14 @@ impl<'a> SelfAgreement<'a> {
     pub fn light_of(&self, model: &str) -> Option<&LightReplies> {
         self.light
             .iter()
-            .find(|light| light.model == model && light.mode == ReadingMode::Strict)
+            .find(|light| light.model == model && light.mode == ParsingMode::Strict)
     }
 
     /// Cells of all families together in the strict parsing.
     pub fn whole(&self) -> impl Iterator<Item = &AgreementCell> + Clone {
         self.cells
             .iter()
-            .filter(|cell| cell.family.is_none() && cell.mode == ReadingMode::Strict)
+            .filter(|cell| cell.family.is_none() && cell.mode == ParsingMode::Strict)
     }
 
     /// Number of informative questions of the bank for a model, and number of all its questions.

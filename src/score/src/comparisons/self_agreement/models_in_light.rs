@@ -4,7 +4,7 @@ use super::bank_index::BankIndex;
 use super::counts::BankCounts;
 use super::kappa::kappa;
 use super::light::LightAnswers;
-use crate::choice::ReadingMode;
+use crate::choice::ParsingMode;
 use crate::cluster::Clusters;
 use crate::estimate::Estimate;
 use crate::grid::Grid;
@@ -29,7 +29,7 @@ pub(super) fn models_in_light(
     models: &[String],
     bank: &BankIndex<'_>,
 ) -> Vec<ModelsInLight> {
-    let mode = ReadingMode::Strict;
+    let mode = ParsingMode::Strict;
     let mut pairs = Vec::new();
     for (index, first) in models.iter().enumerate() {
         let answers = LightAnswers::new(trials, first);

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::bank_index::BankIndex;
 use super::light::{LightAnswers, chosen};
-use crate::choice::ReadingMode;
+use crate::choice::ParsingMode;
 use darkqa_ground::types::Family;
 
 /// Share of the most common answer from which a question is uninformative (chosen).
@@ -42,7 +42,7 @@ pub(super) fn questions_in_light(
     model: &str,
     answers: &LightAnswers<'_>,
     bank: &BankIndex<'_>,
-    mode: ReadingMode,
+    mode: ParsingMode,
 ) -> Vec<QuestionInLight> {
     let mut counts = BTreeMap::<usize, BTreeMap<&str, usize>>::new();
     for trial in answers.first().filter(|trial| !trial.failed()) {

@@ -11,7 +11,7 @@ use super::CameraOrigin;
 use super::mean::{MIN_VALUES, Mean};
 use super::quantile::quantile;
 use super::smooth::{BINS, SpreadCurve};
-use darkqa_ground::types::ReadingName;
+use darkqa_ground::types::ProfileName;
 
 /// Number of gains for which synthetic images are made (chosen).
 pub const LADDER_STEPS: usize = 15;
@@ -184,7 +184,7 @@ impl PooledGain {
 pub struct ProfileFit {
     /// Name of the noise profile.
     #[serde(rename = "reading")]
-    pub profile: ReadingName,
+    pub profile: ProfileName,
     /// Ratio r assumed by the fit, if images determine only the product r · K; `None` if r is 2^ΔEV.
     pub ratio: Option<f64>,
     /// Summary of the gains of the fitted pairs; `None` if no pair was fitted.
@@ -204,7 +204,7 @@ pub struct PairFit {
 impl ProfileFit {
     /// Combines the fits to all pairs.
     #[must_use]
-    pub fn new(profile: ReadingName, ratio: Option<f64>, pairs: Vec<PairFit>) -> Self {
+    pub fn new(profile: ProfileName, ratio: Option<f64>, pairs: Vec<PairFit>) -> Self {
         let gains: Vec<f64> = pairs.iter().filter_map(|pair| pair.fit.fitted()).collect();
         Self {
             profile,
@@ -303,7 +303,7 @@ mod tests {
                 outcome: gain.map_or(FitOutcome::Misfit, |_| FitOutcome::Fitted),
             },
         });
-        ProfileFit::new(ReadingName::PAPER, Some(200.0), pairs.collect())
+        ProfileFit::new(ProfileName::PAPER, Some(200.0), pairs.collect())
     }
 
     #[test]

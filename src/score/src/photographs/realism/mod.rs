@@ -17,7 +17,7 @@ use serde::Serialize;
 pub use ssim::same_size;
 
 use darkqa_ground::error::{Error, Result};
-use darkqa_ground::types::{ReadingName, Rgb};
+use darkqa_ground::types::{ProfileName, Rgb};
 
 /// Similarity of one synthetic image to the real one.
 #[derive(Debug, Clone, Copy, Serialize)]
@@ -82,7 +82,7 @@ pub struct NoiseComparison {
 pub struct NoiseMethod {
     /// Name of the noise profile.
     #[serde(rename = "reading")]
-    pub profile: ReadingName,
+    pub profile: ProfileName,
     pub camera: CameraOrigin,
 }
 

@@ -6,7 +6,7 @@ use super::interner::Interner;
 use super::sent_images::SentImages;
 use crate::types::questions::{UnreadReason, letter};
 use crate::types::{
-    AnswerReading, ChoiceDetail, FrameId, Observed, OptionProbabilities, Record, TrialOutcome,
+    ChoiceDetail, FrameId, Observed, OptionProbabilities, ParsedAnswer, Record, TrialOutcome,
 };
 
 /// The index that means "no entry".
@@ -17,22 +17,22 @@ const NONE: u32 = u32::MAX;
 pub struct ChoiceFacts {
     images: u32,
     rare: u32,
-    strict: Option<PackedReading>,
-    lenient: Option<PackedReading>,
+    strict: Option<PackedAnswer>,
+    lenient: Option<PackedAnswer>,
     pub(super) outcome: TrialOutcome,
     /// Whether the reply is the letter of a choice and nothing else.
     pub(super) is_letter: bool,
 }
 
-/// An [`AnswerReading`] in two bytes.
+/// An [`ParsedAnswer`] in two bytes.
 #[derive(Debug, Clone, Copy)]
-enum PackedReading {
+enum PackedAnswer {
     Chosen(u8),
     Unread(Option<UnreadReason>),
 }
 
-impl From<AnswerReading> for PackedReading {
-    fn from(reading: AnswerReading) -> Self {
+impl From<ParsedAnswer> for PackedAnswer {
+    fn from(reading: ParsedAnswer) -> Self {
         match reading.chosen {
             // A question has at most 26 choices.
             Some(index) => Self::Chosen(index.min(usize::from(u8::MAX)) as u8),
@@ -41,14 +41,14 @@ impl From<AnswerReading> for PackedReading {
     }
 }
 
-impl From<PackedReading> for AnswerReading {
-    fn from(reading: PackedReading) -> Self {
+impl From<PackedAnswer> for ParsedAnswer {
+    fn from(reading: PackedAnswer) -> Self {
         match reading {
-            PackedReading::Chosen(index) => Self {
+            PackedAnswer::Chosen(index) => Self {
                 chosen: Some(usize::from(index)),
                 why: None,
             },
-            PackedReading::Unread(why) => Self { chosen: None, why },
+            PackedAnswer::Unread(why) => Self { chosen: None, why },
         }
     }
 }
@@ -88,8 +88,8 @@ impl ChoiceTables {
         ChoiceFacts {
             images,
             rare: self.add_rare(observed, detail.options.clone()),
-            strict: detail.strict.map(PackedReading::from),
-            lenient: detail.lenient.map(PackedReading::from),
+            strict: detail.strict.map(PackedAnswer::from),
+            lenient: detail.lenient.map(PackedAnswer::from),
             outcome: detail.outcome,
             is_letter: reply.is_some_and(|reply| is_letter(reply, detail.choices.len())),
         }
@@ -146,13 +146,13 @@ impl ChoiceTables {
 
 impl ChoiceFacts {
     /// The strict parsing of the reply; `None` if no reply came.
-    pub(super) fn strict(self) -> Option<AnswerReading> {
-        self.strict.map(AnswerReading::from)
+    pub(super) fn strict(self) -> Option<ParsedAnswer> {
+        self.strict.map(ParsedAnswer::from)
     }
 
     /// The lenient parsing of the reply; `None` if no reply came.
-    pub(super) fn lenient(self) -> Option<AnswerReading> {
-        self.lenient.map(AnswerReading::from)
+    pub(super) fn lenient(self) -> Option<ParsedAnswer> {
+        self.lenient.map(ParsedAnswer::from)
     }
 
     /// The same answers, scored against `reference` instead of the truth. Images and the observer's view are dropped.
@@ -160,7 +160,7 @@ impl ChoiceFacts {
         let outcome = match self.strict() {
             None => TrialOutcome::Failed,
             Some(reading) if reading.chosen == Some(reference) => TrialOutcome::Right,
-            Some(AnswerReading { chosen: None, .. }) => TrialOutcome::Unparsed,
+            Some(ParsedAnswer { chosen: None, .. }) => TrialOutcome::Unparsed,
             Some(_) => TrialOutcome::Wrong,
         };
         Self {

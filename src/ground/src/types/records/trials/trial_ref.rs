@@ -5,8 +5,8 @@ use super::trial_facts::TrialFacts;
 use super::{AskedItem, KeptTrial, SentImages, TextPlace, Trials};
 use crate::types::records::record::{FailureKind, StoredDetail, Via, View};
 use crate::types::{
-    AnswerReading, ChoiceDetail, Condition, Digest, Family, FrameId, LostAttempts, Observed,
-    OpenDetail, OptionProbabilities, QuestionId, Record, Step, TrialKey, TrialOutcome, Usage,
+    ChoiceDetail, Condition, Digest, Family, FrameId, LostAttempts, Observed, OpenDetail,
+    OptionProbabilities, ParsedAnswer, QuestionId, Record, Step, TrialKey, TrialOutcome, Usage,
 };
 
 /// A view of one trial in [`Trials`].
@@ -252,13 +252,13 @@ impl<'t> TrialRef<'t, ChoiceDetail> {
 
     /// The strict parsing of the reply; `None` if no reply came.
     #[must_use]
-    pub fn strict(self) -> Option<AnswerReading> {
+    pub fn strict(self) -> Option<ParsedAnswer> {
         self.facts().facts.strict()
     }
 
     /// The lenient parsing of the reply; `None` if no reply came.
     #[must_use]
-    pub fn lenient(self) -> Option<AnswerReading> {
+    pub fn lenient(self) -> Option<ParsedAnswer> {
         self.facts().facts.lenient()
     }
 

@@ -6,11 +6,11 @@ mod simulated;
 
 use self::simulated::{Answer, IMAGES, QUESTIONS, Simulated, at, found, keep, record};
 use super::evidence::NoEvidence;
-use crate::choice::ReadingMode;
+use crate::choice::ParsingMode;
 use crate::cluster::FrameTies;
 use crate::comparisons::comparison::ComparisonKind;
 use crate::significance::Significance;
-use darkqa_ground::types::{AnswerReading, Record};
+use darkqa_ground::types::{ParsedAnswer, Record};
 
 #[test]
 fn uninformative_questions_are_named_and_left_out_of_one_share() {
@@ -162,7 +162,7 @@ fn two_models_are_held_against_each_other_in_the_light_alone() {
         .map(|(index, mut record)| {
             record.model = "n".into();
             if record.detail.repeat == 0 && index % 10 == 0 {
-                record.detail.strict = record.detail.strict.map(|reading| AnswerReading {
+                record.detail.strict = record.detail.strict.map(|reading| ParsedAnswer {
                     chosen: reading.chosen.map(|chosen| 1 - chosen),
                     ..reading
                 });
@@ -211,7 +211,7 @@ fn nothing_without_a_truth_is_scored_as_an_accuracy() {
         assert_eq!(
             found
                 .grid
-                .counts(0, None, ReadingMode::Strict)
+                .counts(0, None, ParsingMode::Strict)
                 .iter()
                 .map(|c| c.right)
                 .sum::<u32>(),

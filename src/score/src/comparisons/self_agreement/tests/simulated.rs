@@ -7,7 +7,7 @@ use crate::comparisons::self_agreement::SelfAgreement;
 use crate::comparisons::self_agreement::cell::AgreementCell;
 use darkqa_ground::types::questions::BANK_ID;
 use darkqa_ground::types::{
-    AnswerReading, ChoiceDetail, Condition, Digest, Family, FrameId, ModelListing, QuestionId,
+    ChoiceDetail, Condition, Digest, Family, FrameId, ModelListing, ParsedAnswer, QuestionId,
     Record, RunQuestion, TrialOutcome, UnreadReason,
 };
 use darkqa_statistics::split_mix::SplitMix;
@@ -53,7 +53,7 @@ pub(super) fn record(
     chosen: Option<usize>,
 ) -> Record {
     let condition: Option<Condition> = (!condition.is_empty()).then(|| condition.parse().unwrap());
-    let reading = AnswerReading {
+    let reading = ParsedAnswer {
         chosen,
         why: chosen.is_none().then_some(UnreadReason::Refused),
     };

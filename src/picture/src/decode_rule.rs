@@ -1,4 +1,4 @@
-//! The settings that decide how image files are read: [`ReadingRule`].
+//! The settings that decide how image files are read: [`DecodeRule`].
 
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ const MAX_ASPECT_RATIO: usize = 1000;
 
 /// The settings that decide how image files are read.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ReadingRule {
+pub struct DecodeRule {
     /// Maximum number of pixels. A larger image is refused before it is decompressed.
     pub max_pixels: u64,
     /// Handling of colours that are not sRGB.
@@ -26,7 +26,7 @@ pub struct ReadingRule {
     pub exposure_ev: Option<f32>,
 }
 
-impl ReadingRule {
+impl DecodeRule {
     /// The default without a limit, for files of which only the headers are read.
     pub(super) const UNBOUNDED: Self = Self {
         max_pixels: u64::MAX,
@@ -122,7 +122,7 @@ pub enum ColourRule {
 
 flag_words!(ColourRule, Transfer);
 
-impl Default for ReadingRule {
+impl Default for DecodeRule {
     fn default() -> Self {
         Self {
             max_pixels: MAX_PIXELS,
@@ -139,7 +139,7 @@ mod tests {
 
     #[test]
     fn pixels_and_aspect_ratio_are_limited() {
-        let rule = ReadingRule::default();
+        let rule = DecodeRule::default();
         for (width, height, fits) in [
             (10_000, 10_000, true),
             (10_000, 10_001, false),
@@ -150,7 +150,7 @@ mod tests {
             let found = rule.check_size(width, height);
             assert_eq!(found.is_ok(), fits, "{width} × {height}: {found:?}");
         }
-        let user_limit = ReadingRule {
+        let user_limit = DecodeRule {
             max_pixels: MAX_PIXELS - 1,
             ..rule
         };
