@@ -130,15 +130,13 @@ pub(crate) enum Colours {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Output")]
 pub(crate) struct CommonArgs {
-    /// Show no progress, and print where results were written, not the results themselves; a table or JSON that a flag requests is
-    /// printed
+    /// Print no progress and no results, only their paths; tables or JSON requested by a flag are printed
     #[arg(long, global = true, add = Decides::Nothing)]
     pub quiet: bool,
     /// Colours of results; auto: on a terminal, without NO_COLOR, CLICOLOR=0 and TERM=dumb
     #[arg(long, global = true, value_name = "WHEN", value_enum, default_value = "auto", add = Decides::Nothing)]
     pub color: Colours,
-    /// A TOML file of flags by their long names; flags of one command alone are in a table with the name of the command; default:
-    /// DARKQA_CONFIG, else none
+    /// TOML file of flags by their long names; flags of a single command are in a table of its name; default: DARKQA_CONFIG, else none
     #[arg(long, global = true, value_name = "FILE", add = Decides::Nothing)]
     pub config: Option<PathBuf>,
 }

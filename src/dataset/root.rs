@@ -13,7 +13,7 @@ use crate::types::{Decides, FrameId, shell_word};
 /// Flag for further folders with files of the data.
 #[derive(Debug, Clone, Default, Args)]
 pub struct RootArgs {
-    /// A further folder in which files that the data name may lie; repeatable; default: the folder of the data alone
+    /// Additional folder for files that the data name; repeatable; default: the data folder only
     #[arg(long, value_name = "DIR", add = Decides::Reply)]
     pub data_root: Vec<PathBuf>,
 }

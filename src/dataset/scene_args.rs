@@ -14,8 +14,8 @@ use crate::types::{Decides, SetLight};
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Data")]
 pub(crate) struct SceneArgs {
-    /// The light in which the photographs of the data were taken; photographs in the dark are asked at L0 alone, as photographed and
-    /// enhanced, unless --levels and --llie-on state otherwise; default: as dataset.json says, else lit
+    /// Light in which the photographs were taken; dark photographs are evaluated at L0 only, raw and enhanced, unless --levels or --llie-on
+    /// are given; default: from dataset.json, else lit
     #[arg(long, value_enum, value_name = "LIGHT", add = Decides::Trials)]
     pub light: Option<SetLight>,
     /// Photographs of the same scenes in normal and in low light: two folders, or one with folders normal and low; the low ones are
@@ -23,11 +23,12 @@ pub(crate) struct SceneArgs {
     /// default: none
     #[arg(long, value_name = "NORMAL,LOW|DIR", conflicts_with = "label_folders", add = Decides::Reply)]
     pub pairs: Option<PairFolders>,
-    /// The question about each image of a folder that has a folder for each class: the choices are the names of these folders, and the
-    /// answer is the name of the image's own folder; default: none
+    /// Question about each image in a folder with one subfolder per class; choices are the subfolder names, the answer is the image's
+    /// subfolder; default: none
     #[arg(long, value_name = "QUESTION", add = Decides::Reply)]
     pub label_folders: Option<String>,
-    /// How many choices a question of --label-folders has: its own class and others drawn by content, at most 26; default: all classes
+    /// Number of choices of a --label-folders question: its own class and others drawn at random by content, at most 26; default: all
+    /// classes
     #[arg(long, value_name = "N", requires = "label_folders", add = Decides::Reply)]
     pub choices: Option<NonZeroUsize>,
 }

@@ -22,7 +22,7 @@ pub(crate) struct DataArgs {
     /// mmbench:FILE), or built-in rooms, rooms:frames=N,seed=N,size=WIDTHxHEIGHT,light=linear; repeatable for the files of one set
     #[arg(long, value_name = "DIR|FILE|rooms:…", value_parser = parse_data_place, default_values_t = [DataPlace::default()], add = Decides::Reply)]
     pub data: Vec<DataPlace>,
-    /// How a ready-made set is read.
+    /// Options for reading a ready-made set.
     #[command(flatten)]
     pub set: SetArgs,
 }
@@ -50,10 +50,10 @@ impl DataArgs {
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Data")]
 pub(crate) struct SelectionArgs {
-    /// The questions about a folder of frames; default: questions.jsonl in it, else made by rule from its maps
+    /// Questions file for a folder of frames; default: its questions.jsonl, else made by rule from its maps
     #[arg(long, value_name = "FILE", add = Decides::Reply)]
     pub questions: Option<PathBuf>,
-    /// The rulebook that makes the questions of data that have none, and that the observer answers by; default: the one built in
+    /// Rulebook that makes questions for data without any, and by which the observer answers; default: built in
     /// (src/questions/src/rules.toml)
     #[arg(long, value_name = "FILE", add = Decides::Reply)]
     pub rules: Option<PathBuf>,
@@ -69,11 +69,11 @@ pub(crate) struct SelectionArgs {
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Data")]
 pub(crate) struct BankArgs {
-    /// Ask these questions about every image of --data; nobody knows the answers, and the report states how often each model agrees with
-    /// its own answer in the light: home, home:uncertain (built in), or a file of lines with id, question, choices; default: none
+    /// Ask questions without known answers about every image of --data; the report gives each model's agreement with its own answer in the
+    /// light; home or home:uncertain (built in), or a JSONL file of id, question, choices; default: none
     #[arg(long, value_name = "home|home:uncertain|FILE", conflicts_with_all = ["questions", "rules"], add = Decides::Reply)]
     pub ask: Option<BankPlace>,
-    /// Only N of the questions of --ask about each image, drawn by the image's name; default: all
+    /// Ask only N of the questions about each image, drawn by its name; default: all
     #[arg(long, value_name = "N", add = Decides::Trials)]
     pub ask_per_image: Option<NonZeroUsize>,
 }

@@ -88,19 +88,19 @@ pub(crate) struct JobArgs {
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Scale")]
 pub(crate) struct ScaleArgs {
-    /// Do one of N parts, by frames or walks: I/N; auto/N or auto as the batch system states (Slurm arrays, indexed Kubernetes jobs);
-    /// none for everything. --rpm, --tpm and --max-cost are for all parts together. With another N, replies that parts of the first N have
-    /// are copied; default: auto in a Slurm array, else none
+    /// Run shard I of N, split by frames or walks: I/N; auto/N or auto takes the numbers of the batch system (Slurm arrays, indexed
+    /// Kubernetes jobs); none runs everything. --rpm, --tpm and --max-cost apply to all shards together. With another N, replies of earlier
+    /// shards are copied; default: auto in a Slurm array, else none
     #[arg(long, value_name = "I/N|auto/N|auto|none", add = Decides::Trials)]
     pub shard: Option<String>,
-    /// How many parts run at once, so that each may send that share of --rpm and --tpm; default: all of them
+    /// Number of shards that run at once, each with its share of --rpm and --tpm; default: all
     #[arg(long, value_name = "N", add = Decides::Nothing)]
     pub workers: Option<NonZeroU32>,
-    /// Seconds for which an interrupted run (Ctrl-C, SIGTERM, SIGHUP) waits for requests in flight before it gives them up; less than
-    /// the time that a batch system leaves it
+    /// Seconds that an interrupted run (Ctrl-C, SIGTERM, SIGHUP) waits for requests in flight; choose less than the grace period of the
+    /// batch system
     #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "120", add = Decides::Nothing)]
     pub grace: Duration,
-    /// Print at the end how long each step took, what limits the speed and what would help
+    /// Print the time of each step, the bottleneck and remedies at the end
     #[arg(long, add = Decides::Nothing)]
     pub timings: bool,
 }
@@ -109,14 +109,14 @@ pub(crate) struct ScaleArgs {
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Output")]
 pub(crate) struct OutputArgs {
-    /// The run folder; default: results/TIME-MODEL-DATA-HASH, found again by the same command
+    /// Run folder; default: results/TIME-MODEL-DATA-HASH, which the same command finds again
     #[arg(long, value_name = "DIR", conflicts_with = "resume", add = Decides::Nothing)]
     pub out: Option<PathBuf>,
-    /// Continue the run in this folder; takes the same flags as the run had; default: none
+    /// Continue the run in this folder, with the flags of the run; default: none
     #[arg(long, value_name = "DIR", add = Decides::Nothing)]
     pub resume: Option<PathBuf>,
-    /// Let other users of this machine read new folders of runs and of --images-cache, as the system's umask says; else they are for
-    /// you alone, as replies and pictures of homes are in them
+    /// Create run and --images-cache folders with the permissions of the umask; default: readable by you only, because they hold replies
+    /// and pictures of homes
     #[arg(long, add = Decides::Nothing)]
     pub shared: bool,
     /// How the report is printed.

@@ -37,7 +37,7 @@ use darkqa_score::answers::record::{self, Detail as _};
 #[derive(Debug, Args)]
 #[group(arg = "runs")]
 pub(crate) struct ReportArgs {
-    /// The folders of the runs, or of all parts of a run; several runs are compared
+    /// Run folders, or all shards of a run; several runs are compared
     #[arg(value_name = "RUN", required = true, add = Decides::Nothing)]
     pub runs: Vec<PathBuf>,
     /// Read all stored replies again by the rules of this version; asks nothing, and stores the readings that changed

@@ -78,7 +78,7 @@ pub(crate) struct ShowArgs {
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Output")]
 pub(crate) struct WrittenArgs {
-    /// Do not write records.parquet, the records as a table for DuckDB, pandas and R
+    /// Do not write records.parquet (the records for DuckDB, pandas and R)
     #[arg(long, add = Decides::Nothing)]
     pub no_parquet: bool,
 }

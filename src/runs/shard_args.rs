@@ -10,8 +10,8 @@ use crate::types::Decides;
 /// The `--shard` flag.
 #[derive(Debug, Clone, Default, Args)]
 pub(crate) struct ShardArgs {
-    /// Do only this part of the frames, as 2/4, or auto/4 for the task of this process in a Slurm array or the pod of an indexed Kubernetes
-    /// job. All parts together write what one call does; default: all frames
+    /// Process only this shard of the frames, as 2/4, or auto/4 for the task of a Slurm array or the pod of an indexed Kubernetes job. All
+    /// shards together write what one call does; default: all frames
     #[arg(long, value_name = "I/N|auto/N|auto", help_heading = "Scale", add = Decides::Trials)]
     pub shard: Option<String>,
 }

@@ -12,14 +12,14 @@ use crate::types::flags::{positive, seconds};
 #[derive(Debug, Clone, Copy, PartialEq, Args)]
 #[command(next_help_heading = "Sending")]
 pub struct Sending {
-    /// Requests in flight at once: N, fewer if the server is overloaded; MIN-MAX, from MIN up as far as replies come no
-    /// slower; or auto, from 8 up to 32, down to 1
+    /// Requests in flight: N, fewer if the server is overloaded; MIN-MAX, from MIN up while replies do not slow down; auto is 8-32, down to
+    /// 1
     #[arg(long, value_name = "N|MIN-MAX|auto", default_value = "auto", add = Decides::Nothing)]
     pub concurrency: ConcurrencyBounds,
     /// The user's limits per minute.
     #[command(flatten)]
     pub quota: Quota,
-    /// Seconds until a try is given up, reply included
+    /// Seconds for one attempt, reply included
     #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "120", add = Decides::Nothing)]
     pub timeout: Duration,
     /// Retries after a temporary failure
@@ -35,10 +35,10 @@ pub struct Sending {
     /// Seconds for which an endpoint may turn all requests away (status 429) before the run stops; these refusals do not count as retries
     #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "1800", add = Decides::Nothing)]
     pub patience: Duration,
-    /// The longest wait, in seconds, that a server may ask for; beyond it the request is given up
+    /// Longest wait in seconds that a server may ask for; a longer one fails the request
     #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "120", add = Decides::Nothing)]
     pub max_wait: Duration,
-    /// The largest image file that is sent, in MB; default: what is known of the endpoint, else 20
+    /// Largest image file to send, in MB; default: the vendor's limit, else 20
     #[arg(long, value_name = "MB", value_parser = positive, add = Decides::Nothing)]
     pub max_image: Option<f64>,
 }

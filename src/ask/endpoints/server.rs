@@ -33,33 +33,32 @@ const NO_KEY: &str = "none";
 #[derive(Debug, Clone, Default, PartialEq, Args)]
 #[command(next_help_heading = "Model")]
 pub(crate) struct AccessArgs {
-    /// The endpoint; /chat/completions is appended; repeatable for several replicas of one server; default: OPENAI_BASE_URL, else
-    /// OpenAI's own
+    /// Endpoint; /chat/completions is appended; repeatable for replicas of one server; default: OPENAI_BASE_URL, else OpenAI's
     #[arg(long, value_name = "URL", add = Decides::Reply)]
     pub base_url: Vec<String>,
-    /// The variable that holds the API key, or none for an endpoint without keys; default: that of the vendor's own tools
-    /// (ANTHROPIC_API_KEY, GEMINI_API_KEY …), else OPENAI_API_KEY, which goes to no other vendor of the table by itself
+    /// Environment variable with the API key; none for an endpoint without keys; default: the vendor's (ANTHROPIC_API_KEY, GEMINI_API_KEY
+    /// …), else OPENAI_API_KEY, which is never sent to another known vendor by default
     #[arg(long, value_name = "NAME|none", conflicts_with = "api_key_file", add = Decides::Nothing)]
     pub api_key_env: Option<String>,
-    /// A file that holds the API key; default: none, a variable holds it
+    /// File with the API key; default: none, the variable is read
     #[arg(long, value_name = "FILE", add = Decides::Nothing)]
     pub api_key_file: Option<PathBuf>,
-    /// A TOML file of vendors that adds to the built-in table or overrides it, in the same form; default: the built-in table alone
+    /// TOML file of vendors that extends or overrides the built-in table; default: none
     #[arg(long, value_name = "FILE", add = Decides::Nothing)]
     pub vendor: Option<PathBuf>,
     /// Send a key to an address although it looks like a key of another vendor
     #[arg(long, add = Decides::Nothing)]
     pub key_anyway: bool,
-    /// The header that carries the key; auto is what is known of the vendor (api-key at Azure), else bearer
+    /// Header of the key; auto is the vendor's (api-key at Azure), else bearer
     #[arg(long, value_name = "HEADER", value_enum, default_value_t, add = Decides::Nothing)]
     pub key_header: KeyHeader,
-    /// A header that is added to every request; repeatable; default: none
+    /// Header to add to every request; repeatable; default: none
     #[arg(long, value_name = "NAME: VALUE", add = Decides::Nothing)]
     pub header: Vec<String>,
-    /// A header that is added to every request, with a variable that holds its value, which is kept secret; repeatable; default: none
+    /// Header to add to every request, with its secret value from an environment variable; repeatable; default: none
     #[arg(long, value_name = "NAME=VARIABLE", add = Decides::Nothing)]
     pub header_env: Vec<String>,
-    /// A PEM file of certificate authorities to trust besides the system's; default: none
+    /// PEM file of certificate authorities to trust in addition to the system's; default: none
     #[arg(long, value_name = "FILE", add = Decides::Nothing)]
     pub ca_file: Option<PathBuf>,
     /// Send a key over unencrypted http to another machine

@@ -12,10 +12,10 @@ use crate::types::Decides;
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Args)]
 #[command(next_help_heading = "Sending")]
 pub struct Quota {
-    /// The maximum number of requests in any 60 seconds, retries included; default: as many as the server takes
+    /// Maximum requests in any 60 seconds, retries included; default: no limit
     #[arg(id = "rpm", long, value_name = "N", add = Decides::Nothing)]
     pub requests: Option<NonZeroU32>,
-    /// The maximum number of tokens in any 60 seconds, of prompts and replies; default: as many as the server takes
+    /// Maximum tokens in any 60 seconds, prompts and replies; default: no limit
     #[arg(id = "tpm", long, value_name = "N", add = Decides::Nothing)]
     pub tokens: Option<NonZeroU32>,
 }

@@ -16,17 +16,16 @@ use crate::types::Decides;
 #[derive(Debug, Clone, Default, PartialEq, Args)]
 #[command(next_help_heading = "Model")]
 pub(crate) struct RequestArgs {
-    /// Fields for the body of every request, as a JSON object or in a file: objects are merged field by field, everything else
-    /// replaces, null removes (RFC 7396); default: none
+    /// JSON object, or a file with one, merged into every request (JSON Merge Patch, RFC 7396: null removes a field); default: none
     #[arg(long, value_name = "JSON|@FILE", add = Decides::Reply)]
     pub extra_body: Option<String>,
-    /// A field that is left out of the body of every request; repeatable; default: none
+    /// Leave this field out of every request; repeatable; default: none
     #[arg(long, value_name = "FIELD", add = Decides::Reply)]
     pub omit_field: Vec<String>,
-    /// The words of a system message before each question; default: none
+    /// System message before each question; default: none
     #[arg(long, value_name = "TEXT", conflicts_with = "system_file", add = Decides::Reply)]
     pub system: Option<String>,
-    /// A file with the words of a system message before each question; default: none
+    /// File with the system message; default: none
     #[arg(long, value_name = "FILE", add = Decides::Reply)]
     pub system_file: Option<PathBuf>,
 }

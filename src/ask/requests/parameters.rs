@@ -27,14 +27,14 @@ pub struct Parameters {
     /// The model, by the endpoint's name.
     #[arg(skip)]
     pub model: String,
-    /// Sampling temperature; default for the server's own; auto for 0, or the server's own if the model refuses any other
+    /// Sampling temperature; default is the server's own; auto is 0, or the server's own if the model refuses any other
     #[arg(long, value_name = "T|auto|default", default_value_t = Temperature::Auto, add = Decides::Reply)]
     pub temperature: Temperature,
-    /// Draw only from the likeliest tokens that together have this probability; default: not sent
+    /// Nucleus sampling: draw from the likeliest tokens up to this total probability; default: not sent
     #[arg(long, value_name = "P", value_parser = probability, add = Decides::Reply)]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub top_p: Option<f64>,
-    /// The maximum number of tokens of a reply, hidden reasoning included
+    /// Maximum tokens of a reply, hidden reasoning included
     ///
     /// A letter needs 16; a reasoning model uses hundreds before it.
     #[arg(long, value_name = "N", default_value_t = Self::MAX_TOKENS, add = Decides::Reply)]
@@ -43,19 +43,18 @@ pub struct Parameters {
     #[arg(skip)]
     #[serde(skip)]
     pub first_max_tokens: Option<NonZeroU32>,
-    /// The field that carries that limit; auto is what is known of the endpoint, else max_tokens, and the other one if the server asks for
-    /// it
+    /// Field of the token limit; auto is the vendor's field, else max_tokens, or the other one if the server asks for it
     #[arg(long, value_name = "FIELD", value_enum, default_value_t = TokenField::Auto, add = Decides::Reply)]
     #[serde(skip)]
     pub token_field: TokenField,
-    /// How long a reasoning model thinks, in the server's words (none, minimal, low, medium, high …); default: not sent
+    /// Reasoning effort, in the server's words (none, minimal, low, medium, high …); default: not sent
     #[arg(long, value_name = "EFFORT", add = Decides::Reply)]
     pub reasoning_effort: Option<String>,
-    /// Whether the model thinks before it answers, sent in the server's own field (src/ask/thinking.toml); default: not sent
+    /// Turn thinking on or off, in the server's own field (src/ask/thinking.toml); default: not sent
     #[arg(long, value_name = "THINKING", value_enum, add = Decides::Reply)]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub thinking: Option<Thinking>,
-    /// How closely the server looks at images; default: not sent
+    /// Image detail requested from the server; default: not sent
     #[arg(long, value_name = "DETAIL", value_enum, add = Decides::Reply)]
     pub detail: Option<ImageDetail>,
     /// The API: chat in one piece or as a stream, or the Responses API; auto is chat, and what the server asks for instead

@@ -11,8 +11,8 @@ use crate::types::Decides;
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Ready-made sets")]
 pub struct SetArgs {
-    /// Which column of a ready-made set is which, as question=frage,image=pics/{bild}.png,options=auswahl:split(|),answer=richtig:index1;
-    /// default: by their names
+    /// Columns of a ready-made set, as question=frage,image=pics/{bild}.png,options=auswahl:split(|),answer=richtig:index1; default: by
+    /// their names
     #[arg(long, value_name = "ROLE=COLUMN,…", add = Decides::Reply)]
     pub map: Vec<ColumnMap>,
     /// The well-known set that `--data NAME:FILE` names.
@@ -21,16 +21,16 @@ pub struct SetArgs {
     /// The configuration that the rules of that set name.
     #[arg(skip)]
     pub preset_config: Option<String>,
-    /// The configuration of a repository of several, or all of them; default: the one that its card makes the default
+    /// Configuration of a repository, or all; default: the default of its card
     #[arg(long, value_name = "NAME|all", add = Decides::Reply)]
     pub config_name: Option<String>,
-    /// The split, or all of them; default: the only one, or test
+    /// Split, or all; default: the only one, or test
     #[arg(long, value_name = "NAME|all", add = Decides::Reply)]
     pub split: Option<String>,
-    /// Where the rows are in a JSON file, as items or images.*.qa; default: the whole file
+    /// Path to the rows in a JSON file, as items or images.*.qa; default: the whole file
     #[arg(long, value_name = "FIELD", add = Decides::Reply)]
     pub rows: Option<String>,
-    /// Treatment of rows that show several images: leave them out, or send all images of a row in one request; default: stop
+    /// Rows with several images: leave them out, or send all images in one request; default: stop
     #[arg(long, value_name = "skip|send", add = Decides::Trials)]
     pub multi_image: Option<SeveralImages>,
     /// Leave out rows without an image; default: stop
@@ -48,7 +48,7 @@ pub struct SetArgs {
     /// Further folders of the data.
     #[command(flatten)]
     pub root: RootArgs,
-    /// Keep sentences at the end of questions that say in what form to answer; default: cut, because the prompt says it too
+    /// Keep answer instructions at the end of questions; default: cut, because the prompt has its own
     #[arg(long, add = Decides::Reply)]
     pub keep_instructions: bool,
 }
@@ -56,15 +56,15 @@ pub struct SetArgs {
 /// The treatment of rows with several images.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum SeveralImages {
-    /// Leave them out, and state how many
+    /// Leave them out and print their number
     Skip,
-    /// Send all images of a row in one request, in order, each in the same condition; <image 2> in a text is the place of the second
+    /// Send all images of a row in one request, in order and in the same condition; <image 2> in a text places the second
     Send,
 }
 
 /// The treatment of rows that cannot be asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum LeaveOut {
-    /// Leave them out, and state how many
+    /// Leave them out and print their number
     Skip,
 }

@@ -20,13 +20,13 @@ pub(crate) struct MoneyArgs {
     /// Stop when this many trials have failed; default: never
     #[arg(long, value_name = "N", add = Decides::Nothing)]
     pub max_failures: Option<NonZeroUsize>,
-    /// Stop the whole run when one of its models can no longer be asked; else the run continues with the others
+    /// Stop the whole run when one of its models fails for good; default: continue with the others
     #[arg(long, add = Decides::Nothing)]
     pub fail_fast: bool,
-    /// Stop before the run has cost more than this; the same command with a higher limit continues; default: never
+    /// Stop before the run costs more than this; the same command with a higher limit continues; default: no limit
     #[arg(long, value_name = "DOLLARS", value_parser = positive, add = Decides::Nothing)]
     pub max_cost: Option<f64>,
-    /// A TOML file of prices in place of the built-in table; default: the built-in table
+    /// TOML file of prices that replaces the built-in table; default: built in
     #[arg(long, value_name = "FILE", add = Decides::Nothing)]
     pub prices: Option<PathBuf>,
     /// Send nothing: print requests, tokens, dollars, hours and bytes

@@ -11,26 +11,26 @@ use crate::types::Decides;
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Model")]
 pub(crate) struct ModelArgs {
-    /// The model to ask, by its name at the endpoint (required, or --models); repeatable; built in: room-net (a small network that
-    /// sees drawn rooms), observer (frames with maps), its controls (observer:CONTROL), random, script:FILE
+    /// Model to ask, by its name at the endpoint (required, or --models); repeatable; built in: room-net (a small network that sees drawn
+    /// rooms), observer (frames with maps), its controls (observer:CONTROL), random, script:FILE
     #[arg(long, value_name = "NAME", add = Decides::Trials)]
     pub model: Vec<ModelName>,
-    /// Show the models no image, only text
+    /// Send the models text only, no image
     #[arg(long, add = Decides::Trials)]
     pub blind: bool,
     /// Add a text-only baseline by this model; repeatable; default: none
     #[arg(long, value_name = "NAME", add = Decides::Trials)]
     pub blind_model: Vec<ModelName>,
-    /// A TOML file with one table a model: its endpoint, key and settings; default: none
+    /// TOML file with one table per model: endpoint, key and settings; default: none
     #[arg(long, value_name = "FILE", add = Decides::Trials)]
     pub models: Option<PathBuf>,
-    /// Ask only these of the models, by their names, separated by commas; default: all
+    /// Ask only these models, separated by commas; default: all
     #[arg(long, value_name = "NAMES", value_delimiter = ',', add = Decides::Trials)]
     pub only: Vec<String>,
-    /// Trust the file of models although it lies in the folder of the data: it may then name any variable and file
+    /// Trust a models file in the data folder: it may then name any variable and file
     #[arg(long, add = Decides::Nothing)]
     pub trust_models: bool,
-    /// One key of one model, which overrides the file of models; repeatable; default: none
+    /// Override one key of one model in the models file; repeatable; default: none
     #[arg(long, value_name = "NAME.KEY=VALUE", add = Decides::Reply)]
     pub set: Vec<String>,
 }

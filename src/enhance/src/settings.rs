@@ -18,18 +18,17 @@ use darkqa_ground::types::{Decides, SetLight, TreatmentSet};
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Enhancement")]
 pub struct EnhancerArgs {
-    /// An enhancer: lift or gray-gain, which are built in; FILE.onnx; or PRESET:FILE.onnx (zero-dce, zero-dce++, ruas-lol,
-    /// ruas-upe, ruas-dark, sci, iat, pairlie, pairlie-lol, enlightengan, uretinex, retinexformer, darkir, cidnet, llformer,
-    /// restormer, mirnet, kind, agllnet, zero-dce-tf); repeatable: each is shown beside raw; default: none
+    /// Enhancer: lift or gray-gain (built in), FILE.onnx, or PRESET:FILE.onnx (zero-dce, zero-dce++, ruas-lol, ruas-upe, ruas-dark, sci,
+    /// iat, pairlie, pairlie-lol, enlightengan, uretinex, retinexformer, darkir, cidnet, llformer, restormer, mirnet, kind, agllnet,
+    /// zero-dce-tf); repeatable: each is compared with raw; default: none
     #[arg(long, value_name = "NAME|FILE", add = Decides::Trials)]
     pub llie: Vec<PathBuf>,
-    /// Images that were enhanced elsewhere, shown beside raw like those of an enhancer NAME: DIR has an image for each one that `synthesize`
-    /// writes, under its name and with its JSON file; repeatable; default: none
+    /// Images enhanced by another program, evaluated as enhancer NAME: DIR has one image for each that `synthesize` writes, with the same
+    /// name and its JSON file; repeatable; default: none
     #[arg(long, value_name = "NAME=DIR", add = Decides::Trials)]
     pub enhanced: Vec<EnhancedFolder>,
-    /// Which images are enhanced, several with commas: those of a variant (ev, noise, auto, motion); l0, the untouched images, for
-    /// photographs that are dark already; dark, the photographs in the dark beside their frames; both is ev,noise; all is all of these;
-    /// default: noise, or l0 for photographs that are dark already
+    /// Images to enhance, separated by commas: a variant (ev, noise, auto, motion); l0 (untouched images, for photographs that are dark
+    /// already); dark (the dark photographs of pairs); both (ev,noise); all; default: noise, or l0 for photographs that are dark already
     #[arg(long, value_name = "l0|noise|ev|auto|motion|both|dark|all", add = Decides::Trials)]
     pub llie_on: Option<TreatmentSet>,
 }
@@ -95,8 +94,7 @@ impl SizeArgs {
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Enhancement")]
 pub struct ProbeArgs {
-    /// Use an enhancer even if its images of dark frames are implausible: flat, inverted, in swapped colours, or in another value
-    /// range than the one in which they are read; the report marks it
+    /// Use an enhancer whose images are implausible: flat, inverted, in swapped colours or in another value range; the report marks it
     #[arg(long, add = Decides::Nothing)]
     pub llie_anyway: bool,
 }
@@ -116,19 +114,19 @@ impl ProbeArgs {
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Enhancement")]
 pub struct RuntimeArgs {
-    /// The ONNX Runtime library to load; default: ORT_DYLIB_PATH, else the first found beside the program, in its Python
-    /// environment, in the cache folder, in the Python environments on PATH, in the system; else installed once by pip
+    /// ONNX Runtime library; default: ORT_DYLIB_PATH, else the first found next to the program, in its Python environment, the cache
+    /// folder, the Python environments on PATH, or the system; else pip installs it once
     #[arg(long, value_name = "FILE", add = Decides::Nothing)]
     pub ort_lib: Option<PathBuf>,
     /// Never install ONNX Runtime
     #[arg(long, add = Decides::Nothing)]
     pub offline: bool,
-    /// Seconds that an enhancer may take to load, and for one image; a slower one is an error of that image, and after three in a row
-    /// the enhancer is not run any more; 0 is no limit
+    /// Maximum seconds for loading an enhancer and for one image; a slower image fails, and three failures in a row stop the enhancer; 0 is
+    /// no limit
     #[arg(long, value_name = "SECONDS", default_value_t, add = Decides::Nothing)]
     pub llie_timeout: TimeLimit,
-    /// GB (10⁹ bytes) of memory that the program may take while an enhancer runs, on Linux; what takes more is an error of its image,
-    /// and after three in a row the enhancer is not run any more; 0 is no limit; default: 80 % of what is free at the start
+    /// Maximum memory of the program in GB (10⁹ bytes) while an enhancer runs, on Linux; an image that takes more fails, and three failures
+    /// in a row stop the enhancer; 0 is no limit; default: 80 % of the free memory at the start
     #[arg(long, value_name = "GB", add = Decides::Nothing)]
     pub llie_max_memory: Option<MemoryLimit>,
 }

@@ -30,8 +30,8 @@ pub struct LightArgs {
     /// L0-L5 is also the ladder of motion, T8.33-T133.33, unless exposure times are named.
     #[arg(long, value_name = "LEVELS", add = Decides::Trials)]
     pub levels: Option<Levels>,
-    /// Which variants, one or several as ev,auto: ev (exposure drop alone), noise (with sensor noise), both (of these two), auto (as
-    /// a camera with automatic exposure meets the drop), motion (motion blur alone), all
+    /// Variants, as ev,auto: ev (exposure drop alone), noise (with sensor noise), both (of these two), auto (as a camera with automatic
+    /// exposure responds to the drop), motion (motion blur alone), all
     #[arg(long, value_name = "LIST", default_value_t = KindSet::BOTH, add = Decides::Trials)]
     pub variant: KindSet,
     /// The sensor and its noise.
@@ -58,18 +58,18 @@ impl LightArgs {
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Light")]
 pub struct CameraArgs {
-    /// How the automatic exposure of the variant auto meets a drop: the maximum number of stops of longer exposure, then of stops of gain,
-    /// starting at L0 from a system gain K in ADU per electron and an exposure time in seconds; the rest of the drop stays dark
+    /// Automatic exposure of the variant auto: maximum stops of longer exposure (shutter), then of gain; at L0 the system gain is base-gain
+    /// (ADU per electron) and the exposure time base-time (seconds); the rest of the drop stays dark
     ///
-    /// Settings that are not named have their defaults. Those of gain and base-gain follow from the sensor of --noise camera: the gain ends at
-    /// its greatest K, and starts 4 stops below, or at its least K (the paper's: gain=4,base-gain=0.375). The noise is that of the
-    /// noise profile physical at this gain, in this sensor.
+    /// Defaults of gain and base-gain follow from the sensor of --noise camera: gain ends at its largest K and starts 4 stops below, or at
+    /// its smallest K (for the paper's sensor gain=4,base-gain=0.375). The noise is that of the noise profile physical at this gain, in
+    /// this sensor.
     #[arg(long, value_name = "KEY=VALUE,…", default_value_t = AutoSettings::default(), add = Decides::Pixels)]
     pub auto: AutoSettings,
-    /// How the camera turns during an exposure, in the variants motion and auto: speed in degrees per second, horizontal field of view in
-    /// degrees if the data do not state the camera, angle in degrees (0: to the side, 90: up or down) or random for each image
+    /// Camera rotation during an exposure, in the variants motion and auto: speed in degrees per second, hfov (horizontal field of view,
+    /// degrees) for data without camera, angle in degrees (0: sideways, 90: up or down) or random for each image
     ///
-    /// Settings that are not named have their defaults.
+    /// Keys that are not given have their defaults.
     #[arg(long, value_name = "KEY=VALUE,…", default_value_t = Motion::default(), add = Decides::Pixels)]
     pub motion: Motion,
 }
@@ -78,16 +78,16 @@ pub struct CameraArgs {
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Light")]
 pub struct SensorArgs {
-    /// The seed of all random draws
+    /// Seed of all random draws
     #[arg(long, value_name = "N", default_value_t = 0, add = Decides::Pixels)]
     pub seed: u64,
-    /// Noise profiles, ways to understand the paper's noise, one or several as paper,eld; amplify, tone, draws and
-    /// coupling of --noise replace choices of a single profile, which is then custom, or has the name of the profile with the same choices
+    /// Noise profiles (interpretations of the paper's noise model), as paper,eld; amplify, tone, draws and coupling of --noise change a
+    /// single profile, which is then called custom, or by the name of an equal profile
     ///
     /// By default the noise variant has the same signal-to-noise ratio at every level: the levels are one noisy image at five
     /// brightnesses. `--profile physical` loses photons with the light; `--profile all` asks under every profile of the paper.
     ///
-    /// Conditions with noise carry the profile's name, as L3-noise@physical; that of paper is left out: L3-noise.
+    /// Names of noisy conditions end with the profile, as L3-noise@physical; for paper it is omitted: L3-noise.
     #[arg(
         long,
         value_name = "LIST",
@@ -95,21 +95,20 @@ pub struct SensorArgs {
         value_delimiter = ',',
         default_value = "paper", add = Decides::Trials)]
     pub profile: Vec<Profile>,
-    /// Noise that the light ratio r amplifies; default: as --profile says, shot-only in paper
+    /// Noise that the light ratio r amplifies; default: from --profile (paper: shot-only)
     ///
     /// It is the choice that matters most. At grey 128, L1, K 0.77 and r 200, read, row and quantisation noise add 0.03, 0
     /// and 0 codes of deviation with shot-only, and 9–19, 1–3 and 1–2 codes with all. shot-only is the default because it is
     /// what the paper says, and because the paper's comparison with real images fits the weaker noise.
     #[arg(long, value_enum, add = Decides::Pixels)]
     pub amplify: Option<Amplify>,
-    /// Where a forward tone curve is applied; default: as --profile says, none in paper
+    /// Where a forward tone curve is applied; default: from --profile (paper: none)
     #[arg(long, value_enum, add = Decides::Pixels)]
     pub tone: Option<Tone>,
-    /// Whether the levels of a frame are developed from one noisy RAW image or each from its own; default: as --profile says, shared
-    /// in paper
+    /// One noisy RAW image for all levels of a frame (shared), or one for each level (fresh); default: from --profile (paper: shared)
     #[arg(long, value_enum, add = Decides::Pixels)]
     pub draws: Option<Draws>,
-    /// Quantity that the light ratio r depends on; default: as --profile says, independent in paper
+    /// Quantity that the light ratio r depends on; default: from --profile (paper: independent)
     #[arg(long, value_enum, add = Decides::Pixels)]
     pub coupling: Option<Coupling>,
     /// The sensor: sony-a7s2, nikon-d850, canon-eos-5d4, canon-eos-70d, canon-eos-700d, or a TOML file of a calibration

@@ -24,7 +24,7 @@ pub struct Quality(pub(crate) u8);
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Sending")]
 pub struct ImageArgs {
-    /// How images are sent: png (lossless) or jpeg:QUALITY
+    /// Format of sent images: png (lossless) or jpeg:QUALITY
     #[arg(long, value_name = "FORMAT", default_value_t = PayloadFormat::Png, add = Decides::Pixels)]
     pub image: PayloadFormat,
 }

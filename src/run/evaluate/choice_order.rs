@@ -11,10 +11,10 @@ use crate::types::{Choices, Condition, Decides, Digest, Question, Truths};
 #[derive(Debug, Clone, Copy, Args)]
 #[command(next_help_heading = "Data")]
 pub(crate) struct ChoiceOrder {
-    /// Show the choices of each question in an order drawn from --seed, the same in every condition
+    /// Shuffle the choices of each question by --seed, equally in every condition
     #[arg(long, add = Decides::Reply)]
     pub shuffle_options: bool,
-    /// Ask each question once for every rotation of its choices, so that a model's preference for a position averages out
+    /// Ask each question once per rotation of its choices, so that position preferences average out
     #[arg(long, add = Decides::Reply)]
     pub circular: bool,
     /// Ask everything N times; default: once, and with --ask the untouched images twice

@@ -55,20 +55,19 @@ pub(crate) struct EvaluateArgs {
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Model")]
 pub(crate) struct ChoiceArgs {
-    /// Replies that the server lets the model write; constrained replies give other numbers than free ones
+    /// Format that the server enforces on replies; numbers of constrained and free replies differ
     #[arg(long, value_enum, default_value_t, add = Decides::Reply)]
     pub constrain: Constrain,
-    /// Ask how likely each choice is, by the probabilities of tokens (logprobs): the report then has the model's confidence against
-    /// its accuracy; needs temperature 0
+    /// Request token probabilities (logprobs), for a report of confidence against accuracy; needs temperature 0
     #[arg(long, add = Decides::Reply)]
     pub probabilities: bool,
-    /// Show the image before the words, as Anthropic advises, and so that servers can cache it for all questions about a frame
+    /// Send the image before the text, as Anthropic advises; servers can then cache it for all questions about a frame
     #[arg(long, add = Decides::Reply)]
     pub image_first: bool,
-    /// A folder with custom prompts (choice.txt, blind.txt); default: built in
+    /// Folder with custom prompts (choice.txt, blind.txt); default: built in
     #[arg(long, value_name = "DIR", add = Decides::Reply)]
     pub prompts: Option<PathBuf>,
-    /// Ask every control of the observer too (observer:other-room, or observer:tiles if all frames are of one scene, is always asked)
+    /// Also ask every control of the observer (observer:other-room, or observer:tiles with a single scene, is always asked)
     #[arg(long, add = Decides::Trials)]
     pub observer_controls: bool,
 }
@@ -84,7 +83,7 @@ pub(super) enum ImagePlace {
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Sending")]
 pub(crate) struct ShrinkArgs {
-    /// Shrink images whose longer side is longer than this, in pixels; default: never
+    /// Shrink images whose longer side exceeds this, in pixels; default: never
     #[arg(long, value_name = "PIXELS", add = Decides::Pixels)]
     pub max_side: Option<NonZeroU32>,
 }

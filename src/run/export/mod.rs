@@ -45,7 +45,7 @@ pub(crate) struct ExportArgs {
     /// Where the sets go, one for each condition
     #[arg(long, value_name = "DIR", add = Decides::Nothing)]
     pub out: PathBuf,
-    /// How a ready-made set is read.
+    /// Options for reading a ready-made set.
     #[command(flatten)]
     pub set: SetArgs,
     /// The light of the photographs, pairs, and classes by folder.

@@ -33,7 +33,7 @@ pub const KEYED_FLAGS: [KeyedFlag; 14] = [
     KeyedFlag {
         name: "noise",
         heading: "Light",
-        about: "The sensor, and single choices of --profile; default: as --profile says, of sony-a7s2",
+        about: "Sensor, and overrides of --profile; default: as --profile says, of sony-a7s2",
         alone: None,
         keys: &[
             ("camera", "camera"),
@@ -49,7 +49,7 @@ pub const KEYED_FLAGS: [KeyedFlag; 14] = [
     KeyedFlag {
         name: "read",
         heading: "Ready-made sets",
-        about: "How a ready-made set is read; default: as its card and its files say",
+        about: "Options for reading a ready-made set; default: as its card and its files say",
         alone: None,
         keys: &[
             ("config", "config-name"),
@@ -61,7 +61,7 @@ pub const KEYED_FLAGS: [KeyedFlag; 14] = [
     KeyedFlag {
         name: "skip",
         heading: "Ready-made sets",
-        about: "Which rows of a ready-made set are left out instead of stopping, with their number; default: none",
+        about: "Rows of a ready-made set to leave out, with a count, instead of stopping; default: none",
         alone: Some("skip"),
         keys: &[
             ("no-image", "no-image"),
@@ -85,7 +85,7 @@ pub const KEYED_FLAGS: [KeyedFlag; 14] = [
     KeyedFlag {
         name: "choice-order",
         heading: "Data",
-        about: "In which orders the choices of a question are shown; default: as in the data",
+        about: "Order of the choices; default: as in the data",
         alone: None,
         keys: &[("shuffle", "shuffle-options"), ("circular", "circular")],
     },
@@ -99,7 +99,7 @@ pub const KEYED_FLAGS: [KeyedFlag; 14] = [
     KeyedFlag {
         name: "llie-options",
         heading: "Enhancement",
-        about: "How enhancers are run; default: in tiles where that is exact, with the ONNX Runtime that is found",
+        about: "Options for running enhancers; default: in tiles where that is exact, with the ONNX Runtime that is found",
         alone: None,
         keys: &[
             ("tile", "tile"),
@@ -127,7 +127,7 @@ pub const KEYED_FLAGS: [KeyedFlag; 14] = [
     KeyedFlag {
         name: "allow",
         heading: "Model",
-        about: "What is refused unless it is named here; default: none",
+        about: "Allow actions that are refused by default; default: none",
         alone: None,
         keys: &[
             ("http", "allow-http"),
@@ -151,7 +151,7 @@ pub const KEYED_FLAGS: [KeyedFlag; 14] = [
     KeyedFlag {
         name: "stop",
         heading: "Sending",
-        about: "When a run stops before its end; default: when no model can be asked any more",
+        about: "Early stop of a run; default: when no model can be asked any more",
         alone: None,
         keys: &[
             ("failures", "max-failures"),
