@@ -7,6 +7,7 @@ use serde_json::Value;
 
 use crate::support::recording::{Compression, Records, SIZE, compressed, drive, image, picture};
 use crate::support::run::{Bench, Called};
+use crate::support::snapshot::redacted;
 
 /// A folder with the recording `drive.mcap`.
 fn with_recording(file: impl AsRef<[u8]>) -> Bench {
@@ -59,12 +60,10 @@ fn topics_are_listed_without_a_folder() {
     assert_eq!(lines[2].join(" "), "3 further topics without images");
     assert!(!bench.path("out").exists());
     let refused = import(&bench, "--out out").ended(2);
-    assert!(
-        refused
-            .stderr
-            .contains("choose one or more of /front/image_raw, /rear/"),
-        "{refused:?}"
-    );
+    insta::assert_snapshot!(refused.messages(), @"
+    exit code: 2
+    error: --topic: several topics have images; choose one or more of /front/image_raw, /rear/image_raw/compressed
+    ");
 }
 
 #[test]
@@ -140,10 +139,10 @@ fn stretches_are_scenes_whatever_is_taken() {
         "--topic /front/image_raw --at 1,99 --out out --force",
     )
     .ended(0);
-    assert!(
-        missed.stderr.contains("no frame at 99 s or later"),
-        "{missed:?}"
-    );
+    insta::assert_snapshot!(missed.messages(), @"
+    exit code: 0
+     WARN /front/image_raw: no frame at [TIME] or later; 1 time of --at
+    ");
 }
 
 #[test]
@@ -188,12 +187,11 @@ fn a_cut_recording_gives_its_frames() {
     file.truncate(file.len() * 7 / 10);
     let bench = with_recording(file);
     let called = import(&bench, "--topic /front/image_raw --every 0 --out out").ended(1);
-    assert!(
-        called
-            .stderr
-            .contains("the recording is cut off after /front/image_raw at "),
-        "{called:?}"
-    );
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 1
+     WARN drive.mcap: the recording is cut off after /front/image_raw at [TIME]: its bytes end too early; frames
+        up to there are kept
+    ");
     let frames = frames(&bench).len();
     assert!((4..8).contains(&frames), "{frames}");
 }
@@ -206,12 +204,10 @@ fn a_damaged_chunk_is_left_out() {
     file[row] ^= 0x10;
     let bench = with_recording(file);
     let called = import(&bench, "--topic /front/image_raw --every 0 --out out").ended(1);
-    assert!(
-        called
-            .stderr
-            .contains("its checksum differs; 2 frames of it left out"),
-        "{called:?}"
-    );
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 1
+     WARN drive.mcap: a damaged chunk, -[TIME] to -[TIME]: its checksum differs; 2 frames of it left out
+    ");
     assert_eq!(frames(&bench).len(), 6);
 }
 
@@ -224,12 +220,10 @@ fn time_that_goes_back_starts_a_scene_and_is_reported() {
     }
     let bench = with_recording(records.file());
     let called = import(&bench, "--out out").ended(0);
-    assert!(
-        called
-            .stderr
-            .contains("time goes back 1 time, first /c at 30.000 s, 97.000 s before"),
-        "{called:?}"
-    );
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 0
+     WARN drive.mcap: time goes back 1 time, first /c at [TIME], [TIME] before the frame in front of it
+    ");
     assert_eq!(
         names(&bench),
         [
@@ -253,19 +247,23 @@ fn topics_with_other_clocks_are_sampled_alike() {
     }
     let bench = with_recording(records.file());
     let called = import(&bench, "--topic /front --topic /rear --every 10 --out out").ended(0);
-    assert!(called.stdout.contains("8 frames of 2 scenes"), "{called:?}");
+    insta::assert_snapshot!(called, @"
+    exit code: 0
+    stdout:
+    out: 8 frames of 2 scenes ([TIME] each), chosen from 80
+    topics: /front, /rear; one every [TIME]
+    intrinsics: 0 of 8 frames; exposure: 0
+    ");
 }
 
 #[test]
 fn a_topic_without_messages_keeps_the_frames_of_others() {
     let bench = with_recording(drive(4, Compression::None));
     let called = import(&bench, "--topic /front/image_raw --topic /middle --out out").ended(1);
-    assert!(
-        called
-            .stderr
-            .contains("no messages of /middle; topics with images: /front/image_raw, /rear/"),
-        "{called:?}"
-    );
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 1
+     WARN drive.mcap: no messages of /middle; topics with images: /front/image_raw, /rear/image_raw/compressed
+    ");
     assert_eq!(frames(&bench).len(), 2);
 }
 
@@ -318,35 +316,41 @@ fn images_that_cannot_be_read_are_named() {
     }
     let bench = with_recording(records.file());
     let listed = import(&bench, "").ended(0);
-    for expected in [
-        "unknown encoding \"nv12\"",
-        "compressedDepth png\" is depth",
-        "serialization \"flatbuffer\"",
-    ] {
-        assert!(listed.stdout.contains(expected), "{expected}: {listed:?}");
-    }
+    insta::assert_snapshot!(listed, @r#"
+    exit code: 0
+    stdout:
+    /depth  sensor_msgs/CompressedImage  not read: format "16UC1; compressedDepth png" is depth, not an image
+                                    2 messages, 0.3 Hz, [TIME]
+    /flat   foxglove.RawImage            not read: serialization "flatbuffer"; cdr, ros1, protobuf or json
+        expected                            2 messages, 0.3 Hz, [TIME]
+    /good   sensor_msgs/Image            2×2 mono8
+                                    2 messages, 0.3 Hz, [TIME]
+    /odd    sensor_msgs/Image            not read: unknown encoding "nv12"; rgb8, bgr8, rgba8, bgra8, mono8,
+        bayer_*8 or the same with 16 ex…  2 messages, 0.3 Hz, [TIME]
+    0 further topics without images
+    "#);
     // The only topic that can be read is taken.
     import(&bench, "--out out").ended(0);
     assert_eq!(frames(&bench)[0]["topic"], "/good");
     let named = import(&bench, "--topic /good --topic /odd --out out --force").ended(1);
-    assert!(
-        named
-            .stderr
-            .contains("/odd at 0.000 s: unknown encoding \"nv12\"; rgb8"),
-        "{named:?}"
-    );
-    assert!(
-        named.stderr.contains("/odd: 2 frames could not be read"),
-        "{named:?}"
-    );
+    insta::assert_snapshot!(named.messages(), @r#"
+    exit code: 1
+    ERROR drive: /odd at [TIME]: unknown encoding "nv12"; rgb8, bgr8, rgba8, bgra8, mono8, bayer_*8 or the same
+        with 16 expected
+     WARN drive: /odd: 2 frames could not be read
+    "#);
+
     let flat = import(&bench, "--topic /flat --out out --force").ended(2);
-    assert!(
-        flat.stderr
-            .contains("/flat: serialization \"flatbuffer\"; cdr,"),
-        "{flat:?}"
-    );
+    insta::assert_snapshot!(flat.messages(), @r#"
+    exit code: 2
+    ERROR drive: /flat: serialization "flatbuffer"; cdr, ros1, protobuf or json expected
+    error: drive.mcap: no frame of it could be taken
+    "#);
     let none = import(&bench, "--topic /nothing --out out --force").ended(2);
-    assert!(none.stderr.contains("no messages of /nothing"), "{none:?}");
+    insta::assert_snapshot!(none.messages(), @"
+    exit code: 2
+    error: drive.mcap: no messages of /nothing; topics with images: /depth, /good, /odd
+    ");
 }
 
 #[test]
@@ -366,11 +370,11 @@ fn codes_of_sixteen_bits_are_kept_and_scaled() {
             .0
     };
     let dark = import(&bench, "--out out").ended(0);
-    assert!(
-        dark.stderr
-            .contains("for a sensor of 12 bits set --white 4095"),
-        "{dark:?}"
-    );
+    insta::assert_snapshot!(dark.messages(), @"
+    exit code: 0
+     WARN the greatest code of the images of 16 bits is 4095: they are dark, unless their white is less than
+        65535; for a sensor of 12 bits set --white 4095
+    ");
     assert_eq!(third(), [4095; 3]);
     let scaled = import(&bench, "--out out --force --white 4095").ended(0);
     assert_eq!((third(), &*scaled.stderr), ([65535; 3], ""));
@@ -395,12 +399,10 @@ fn other_files_are_named_for_what_they_are() {
     records.topic(1, "/imu", "sensor_msgs/msg/Imu", "cdr", "");
     records.message(1, 0.0, b"x");
     let called = import(&with_recording(records.file()), "--out out").ended(2);
-    assert!(
-        called
-            .stderr
-            .contains("no topic with images: its topics are /imu (sensor_msgs/Imu)"),
-        "{called:?}"
-    );
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 2
+    error: drive.mcap: no topic with images: its topics are /imu (sensor_msgs/Imu)
+    ");
 }
 
 #[test]
@@ -433,14 +435,17 @@ fn a_broken_file_of_a_bag_keeps_the_others() {
     let called = bench
         .call(&["import", "mcap", "bag", "--out", "out"])
         .ended(1);
-    assert!(
-        called.stderr.contains("bag_1.mcap: the file is empty"),
-        "{called:?}"
-    );
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 1
+     WARN bag/bag_1.mcap: the file is empty, as a recorder leaves it that is killed
+    ");
     assert_eq!(frames(&bench).len(), 1);
     bench.file("other/bag.db3", b"SQLite format 3\0");
     let called = bench.call(&["import", "mcap", "other"]).ended(2);
-    assert!(called.stderr.contains("rosbags-convert"), "{called:?}");
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 2
+    error: other: a bag of ROS 2 in SQLite; convert it: rosbags-convert --src FOLDER --dst NEW --dst-storage mcap
+    ");
 }
 
 #[test]
@@ -448,8 +453,13 @@ fn a_bag_of_ros_1_gets_its_conversion() {
     let bench = Bench::new();
     bench.file("my drive.bag", b"#ROSBAG V2.0\n");
     let called = bench.call(&["import", "rosbag", "my drive.bag"]).ended(2);
-    let expected = "rosbags-convert --src 'my drive.bag' --dst 'my drive' --dst-storage mcap";
-    assert!(called.stderr.contains(expected), "{called:?}");
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 2
+    error: my drive.bag: bags of ROS 1 are not read; convert it, which changes no image:
+      pip install rosbags
+      rosbags-convert --src 'my drive.bag' --dst 'my drive' --dst-storage mcap
+      darkqa-eval import mcap 'my drive'
+    ");
 }
 
 /// A program `ffmpeg` that writes four images, half a second apart, as ffmpeg does.
@@ -500,10 +510,12 @@ fn frames_of_a_video_come_from_ffmpeg() {
         &bench.path("bin"),
     )
     .ended(0);
-    assert!(
-        called.stdout.contains("4 frames of 2 scenes (2 s each)\n"),
-        "{called:?}"
-    );
+    insta::assert_snapshot!(called, @"
+    exit code: 0
+    stdout:
+    out: 4 frames of 2 scenes ([TIME] each)
+    video: h264 (High), yuv420p, 4x2, 2 fps; one every [TIME]
+    ");
     assert_eq!(frames(&bench)[3]["t"], 3.5);
     let image = image::open(bench.path("out/scenes/drive-0001/rgb/000003.png"))
         .unwrap()
@@ -513,10 +525,13 @@ fn frames_of_a_video_come_from_ffmpeg() {
         ((4, 2), *b"abc", *b"vw3")
     );
     let calls = fs::read_to_string(bench.path("calls")).unwrap();
-    assert!(
-        calls.contains("-protocol_whitelist file,pipe -i file:drive.mp4 -map 0:v:0 -vf select="),
-        "{calls}"
-    );
+    insta::assert_snapshot!(redacted(&calls), @"
+    -nostdin -nostats -protocol_whitelist file,pipe -i file:drive.mp4
+    -nostdin -nostats -protocol_whitelist file,pipe -i file:drive.mp4
+    -nostdin -nostats -protocol_whitelist file,pipe -i file:drive.mp4 -map 0:v:0 -vf
+        select='isnan(prev_selected_t)+gt(floor((t-start_t)/1+1e-7),floor((prev_selected_t-start_t)/1+1e-7))',showinfo
+        -fps_mode passthrough -pix_fmt rgb24 -c:v ppm -f image2pipe -
+    ");
 }
 
 #[cfg(unix)]
@@ -526,12 +541,11 @@ fn a_broken_video_gives_its_frames() {
     bench.file("drive.mp4", b"x");
     with_ffmpeg(&bench, "echo 'moov atom not found' >&2; exit 1");
     let called = import_video(&bench, "--every 0 --out out", &bench.path("bin")).ended(1);
-    assert!(
-        called
-            .stderr
-            .contains("moov atom not found; frames up to there are kept"),
-        "{called:?}"
-    );
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 1
+     WARN drive.mp4: ffmpeg: it ends with an error; Stream #0:0: Video: h264 (High), yuv420p, 4x2, 2 fps; moov
+        atom not found; frames up to there are kept
+    ");
     assert_eq!(frames(&bench).len(), 4);
 }
 
@@ -542,12 +556,10 @@ fn damage_that_ffmpeg_reports_is_named() {
     bench.file("drive.mp4", b"x");
     with_ffmpeg(&bench, "echo 'error while decoding MB 3 5' >&2; exit 0");
     let called = import_video(&bench, "--every 0 --out out", &bench.path("bin")).ended(1);
-    assert!(
-        called
-            .stderr
-            .contains("ffmpeg reports a problem: error while decoding MB 3 5"),
-        "{called:?}"
-    );
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 1
+     WARN drive.mp4: ffmpeg reports a problem: error while decoding MB 3 5; its frames are kept
+    ");
     assert_eq!(frames(&bench).len(), 4);
 }
 
@@ -558,9 +570,9 @@ fn without_ffmpeg_the_remedy_is_named() {
     bench.file("drive.mp4", b"x");
     let mut command = bench.command(&["import", "video", "drive.mp4", "--out", "out"]);
     let called = crate::support::run::called(command.env("PATH", bench.path("empty"))).ended(2);
-    assert!(
-        called.stderr.contains("ffmpeg: not found on PATH")
-            && called.stderr.contains("apt install ffmpeg"),
-        "{called:?}"
-    );
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 2
+    error: ffmpeg: not found on PATH; videos are decoded by it: install it (apt install ffmpeg, brew install
+        ffmpeg), or give the folder of extracted images to --data
+    ");
 }

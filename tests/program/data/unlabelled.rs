@@ -6,6 +6,7 @@ use std::fs;
 use serde_json::{Value, json};
 
 use crate::support::run::{Bench, records, words};
+use crate::support::snapshot::redacted;
 
 /// Number of photographs.
 const PHOTOGRAPHS: usize = 12;
@@ -94,11 +95,13 @@ fn pairs_are_not_asked_without_true_answers() {
     let called = bench.call(&words(
         "--pairs light,dark --ask home --model random --levels L0 --out run",
     ));
-    assert_eq!(called.code, Some(2), "{called:?}");
-    assert!(
-        called.stderr.contains("--pairs: ") && called.stderr.contains("--light dark"),
-        "{called:?}"
-    );
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 2
+     WARN --data: no effect: --pairs names the data
+    error: --pairs: the photographs in the dark would not be asked about with --ask: write questions with answers
+        about the files in normal light (--questions), or ask about the dark ones alone with --data DIR --light
+        dark
+    ");
     assert!(!bench.path("run").exists());
 }
 
@@ -106,14 +109,14 @@ fn pairs_are_not_asked_without_true_answers() {
 fn a_folder_of_photographs_is_asked_and_no_reply_is_right_or_wrong() {
     let bench = photographs();
     let called = bench.call(&words(ASKED));
-    assert_eq!(called.code, Some(0), "{called:?}");
-    for said in [
-        "12 images in it and in the folders below, each named by its path from there",
-        "--ask bank.jsonl: 36 questions about 12 images without answers (3 each)",
-        "is asked without images, too",
-    ] {
-        assert!(called.stderr.contains(said), "{said}: {}", called.stderr);
-    }
+    insta::assert_snapshot!(called.messages(), @r#"
+    exit code: 0
+    photos: 12 images in it and in the folders below, each named by its path from there
+    --ask bank.jsonl: 36 questions about 12 images without answers (3 each); each model is compared with its own
+        answers at L0, and is asked without images, too
+     WARN Folders suggest 2 scenes (hall, kitchen), but the data name none, so the 12 frames count as independent;
+        a "scene" in each question (or --map scene=COLUMN) names them
+    "#);
     let records = records(&bench.path("run"));
     // Twice at L0, once at L1, at L5 and without an image.
     assert_eq!(records.len(), 36 * 5);
@@ -294,12 +297,7 @@ fn a_way_out_is_a_measure_of_its_own() {
     bench.file("eyes.jsonl", replies);
     let shown = bench.complete(&words(ASKED));
     let shown = on_one_line(&shown);
-    assert!(
-        shown.contains(
-            "script:eyes.jsonl says “cannot tell” to 0.0 % of the questions at L0, and to 100.0 % at L5"
-        ),
-        "{shown}"
-    );
+    assert!(shown.contains("script:eyes.jsonl says “cannot tell” to 0.0 % of the questions at L0, and to 100.0 % at L5"),"{shown}");
     let own = rows(&bench, "run/own_answers.csv");
     let dark = row(
         &own,
@@ -418,7 +416,13 @@ fn images_of_rooms_and_of_sets_are_asked_too() {
         assert_eq!(called.code, Some(0), "{called:?}");
         called.stderr
     };
-    assert!(call("set.jsonl", "one").contains("its own questions (1) are ignored"));
+    insta::assert_snapshot!(redacted(&call("set.jsonl", "one")), @"
+    set.jsonl: its own questions (1) are ignored, and those of --ask are asked about its images
+    --ask home:uncertain: 2 questions about 1 image without answers (2 each); each model is compared with its own
+        answers at L0, and is asked without images, too
+     WARN --ask home:uncertain: with one image, nothing shows that an answer depends on the image; name a folder
+        with several
+    ");
     assert_eq!(records(&bench.path("one")).len(), 2 * 4);
     call("rooms:frames=6,size=64x48", "two");
     assert_eq!(records(&bench.path("two")).len(), 12 * 4);
@@ -509,8 +513,16 @@ fn photographs_in_the_dark_are_asked_as_they_are() {
     }
     // The same images without the flag are taken for images in the light.
     let called = bench.call(&words(&line.replace("--out run", "--out lit --levels L0")));
-    assert_eq!(called.code, Some(0), "{called:?}");
-    assert!(called.stderr.contains("dark already"), "{called:?}");
+    insta::assert_snapshot!(called.messages(), @r#"
+    exit code: 0
+    photos: 12 images in it and in the folders below, each named by its path from there
+    --ask bank.jsonl: 36 questions about 12 images without answers (3 each); each model is compared with its own
+        answers at L0, and is asked without images, too
+     WARN Folders suggest 2 scenes (hall, kitchen), but the data name none, so the 12 frames count as independent;
+        a "scene" in each question (or --map scene=COLUMN) names them
+     WARN these images are dark already (median brightness 7 of 255); --levels L0 --llie-on l0 asks about them as
+        they are and enhanced, and --light dark does so by default
+    "#);
     let shown = on_one_line(&called.stdout);
     assert!(
         !shown.contains("taken in the dark") && shown.contains("random, untouched"),
@@ -538,10 +550,7 @@ fn an_enhancer_of_photographs_in_the_dark_does_no_harm_in_the_light() {
     let line = "--data photos --ask bank.jsonl --model script:eyes.jsonl --llie lift";
     let of = |flags: &str| on_one_line(&bench.complete(&words(&format!("{line} {flags}"))));
     let dark = of("--light dark --out dark");
-    assert!(
-        dark.contains("Lift changes answers of script:eyes.jsonl to these photographs: whether for the better is not known (trained on this program's synthesis)."),
-        "{dark}"
-    );
+    assert!(dark.contains("Lift changes answers of script:eyes.jsonl to these photographs: whether for the better is not known (trained on this program's synthesis)."),"{dark}");
     assert!(!dark.contains("harm"), "{dark}");
     let lit = of("--levels L0 --llie-on l0 --out lit");
     assert!(lit.contains("harm where nothing was dark"), "{lit}");
