@@ -5,6 +5,7 @@ use std::path::Path;
 use std::process::Command;
 
 use crate::support::run::{Called, PROGRAM, called};
+use crate::support::snapshot::redacted;
 use crate::support::table::check_rows;
 use darkqa_eval::internals::dataset::{DataPlace, Dataset, SetArgs};
 use darkqa_ground::types::{Question, Rgb, Severity};
@@ -178,10 +179,9 @@ fn nothing_is_written_over_unasked() {
     let message = run(data.path(), "llava", out.path(), &flags)
         .ended(2)
         .stderr;
-    assert!(
-        message.contains("questions.jsonl: the set exists already; --force"),
-        "{message}"
-    );
+    insta::assert_snapshot!(redacted(&message), @"
+    error: [TMP]/L0/questions.jsonl: the set exists already; --force overwrites it, another --out keeps both
+    ");
     run(
         data.path(),
         "llava",
@@ -192,10 +192,7 @@ fn nothing_is_written_over_unasked() {
     let message = run(data.path(), "parquet", out.path(), &flags)
         .ended(2)
         .stderr;
-    assert!(
-        message.contains(
-            "invalid value 'parquet' for '<KIND>' [possible values: vlmevalkit, imagefolder, llava"
-        ),
-        "{message}"
-    );
+    insta::assert_snapshot!(redacted(&message), @"
+    error: invalid value 'parquet' for '<KIND>' [possible values: vlmevalkit, imagefolder, llava]
+    ");
 }

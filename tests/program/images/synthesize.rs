@@ -70,12 +70,10 @@ fn any_drop_and_several_readings_are_made() {
         ]
         .concat(),
     );
-    assert_eq!(refused.code, Some(2), "{refused:?}");
-    assert!(
-        refused
-            .stderr
-            .contains("--noise tone: cannot be combined with several profiles")
-    );
+    insta::assert_snapshot!(refused.messages(), @"
+    exit code: 2
+    error: --noise tone: cannot be combined with several profiles; name one in --profile
+    ");
 }
 
 #[test]
@@ -101,22 +99,17 @@ fn what_is_there_is_kept_unless_it_is_another() {
         other.stdout,
         "out: 0 made of 1 frame, 1 left as they were (--force makes them again), 1 failed\n"
     );
-    assert!(
-        other.stderr.contains(
-            "a_L2-noise.png: made with --seed 0, now 1; --force overwrites it, another --out keeps both"
-        ),
-        "{}",
-        other.stderr
-    );
+    insta::assert_snapshot!(other.messages(), @"
+    exit code: 1
+    ERROR out/a_L2-noise.png: made with --seed 0, now 1; --force overwrites it, another --out keeps both
+    ");
     assert_eq!(at_two_levels("").code, Some(0));
     let other = at_two_levels("--noise gain=2");
-    assert!(
-        other
-            .stderr
-            .contains("made with another --noise camera, gain, ratio or fixed; --force"),
-        "{}",
-        other.stderr
-    );
+    insta::assert_snapshot!(other.messages(), @"
+    exit code: 1
+    ERROR out/a_L2-noise.png and 1 more: made with another --noise camera, gain, ratio or fixed; --force
+        overwrites it, another --out keeps both
+    ");
     let other = at_two_levels("--seed 9");
     let lines: Vec<&str> = other.stderr.lines().collect();
     assert!(
@@ -174,11 +167,10 @@ fn a_json_file_vouches_for_the_bytes_of_its_image() {
     fs::write(&image, &written[..written.len() / 2]).unwrap();
     let again = call("");
     assert_eq!(again.stdout, "out: 1 made of 1 frame\n");
-    assert!(
-        again
-            .stderr
-            .contains("a_L2-ev.png: cut or damaged; it is made again")
-    );
+    insta::assert_snapshot!(again.messages(), @"
+    exit code: 0
+     WARN out/a_L2-ev.png: cut or damaged; it is made again
+    ");
     assert_eq!(fs::read(&image).unwrap(), written);
 
     // The same pixels from another encoder: kept, and the JSON file vouches for the new bytes.
@@ -192,12 +184,11 @@ fn a_json_file_vouches_for_the_bytes_of_its_image() {
     let edited = as_jpeg(&image);
     fs::write(&image, &edited).unwrap();
     let refused = call("");
-    assert_eq!(refused.code, Some(1));
-    assert!(
-        refused.stderr.contains("a_L2-ev.png: has") && refused.stderr.contains("--force"),
-        "{}",
-        refused.stderr
-    );
+    insta::assert_snapshot!(refused.messages(), @"
+    exit code: 1
+    ERROR out/a_L2-ev.png: has 730 bytes, was written with 2420, and its pixels differ; --force overwrites it,
+        another --out keeps both
+    ");
     assert_eq!(fs::read(&image).unwrap(), edited);
     assert_eq!(call("--force").stdout, "out: 1 made of 1 frame\n");
     assert_eq!(fs::read(&image).unwrap(), written);
@@ -209,40 +200,52 @@ fn a_json_file_vouches_for_the_bytes_of_its_image() {
     fs::remove_file(&json).unwrap();
     fs::write(&image, fs::read(bench.path("frames/a.png")).unwrap()).unwrap();
     let refused = call("");
-    assert!(
-        refused.stderr.contains("no JSON file describes it"),
-        "{}",
-        refused.stderr
-    );
+    insta::assert_snapshot!(refused.messages(), @"
+    exit code: 1
+    ERROR out/a_L2-ev.png: no JSON file describes it, and its pixels differ; --force overwrites it, another --out
+        keeps both
+    ");
     assert!(!json.exists());
 
     // A JSON file without its image, and one of the first schema, which had no digest.
     assert_eq!(call("--force").code, Some(0));
     fs::remove_file(&image).unwrap();
     let missing = bench.call(&words("synthesize --check out"));
-    assert_eq!(missing.code, Some(1));
-    assert!(missing.stderr.contains("a_L2-ev.png"), "{}", missing.stderr);
+    insta::assert_snapshot!(missing.messages(), @"
+    exit code: 1
+    ERROR out/a_L2-ev.png: cannot read: [OS ERROR]
+    ");
     assert_eq!(call("").stdout, "out: 1 made of 1 frame\n");
     let mut old = json_of(&json);
     old["schema"] = "darkqa.image/1".into();
     old.as_object_mut().unwrap().remove("output");
     fs::write(&json, old.to_string()).unwrap();
     let unvouched = bench.call(&words("synthesize --check out"));
-    assert!(
-        unvouched.stderr.contains("has no digest"),
-        "{}",
-        unvouched.stderr
-    );
+    insta::assert_snapshot!(unvouched.messages(), @"
+    exit code: 1
+    ERROR out/a_L2-ev.json: has no digest of its image: an older version wrote it; run `synthesize` again to add
+        it
+    ");
     // Its image has a JSON file, though one that cannot vouch for it.
-    let counted = "not as they were written: 1; without a JSON file: 0";
-    assert!(unvouched.stdout.contains(counted), "{unvouched:?}");
+    insta::assert_snapshot!(unvouched, @"
+    exit code: 1
+    stdout:
+    out: images as they were written: 0; not as they were written: 1; without a JSON file: 0
+    stderr:
+    ERROR out/a_L2-ev.json: has no digest of its image: an older version wrote it; run `synthesize` again to add
+        it
+    ");
     fs::copy(&image, bench.path("out/foreign.png")).unwrap();
     let foreign = bench.call(&words("synthesize --check out"));
-    assert!(
-        foreign.stdout.contains("without a JSON file: 1"),
-        "{foreign:?}"
-    );
-    assert!(foreign.stderr.contains("foreign.png"), "{foreign:?}");
+    insta::assert_snapshot!(foreign, @"
+    exit code: 1
+    stdout:
+    out: images as they were written: 0; not as they were written: 1; without a JSON file: 1
+    stderr:
+    ERROR out/a_L2-ev.json: has no digest of its image: an older version wrote it; run `synthesize` again to add
+        it
+    ERROR out: no JSON file says how they were made: foreign.png
+    ");
     fs::remove_file(bench.path("out/foreign.png")).unwrap();
     assert_eq!(call("").stdout, kept);
     assert_eq!(json_of(&json)["schema"], "darkqa.image/2");
@@ -283,8 +286,11 @@ fn a_file_makes_its_image_again() {
     let wrong = bench.call(&words(
         "synthesize b.png --out again --from out/a_L3-noise@custom.json",
     ));
-    assert_eq!(wrong.code, Some(2));
-    assert!(wrong.stderr.contains("another image"), "{}", wrong.stderr);
+    insta::assert_snapshot!(wrong.messages(), @"
+    exit code: 2
+    error: out/a_L3-noise@custom.json: made from another image than INPUT (their contents differ, or the flags by
+        which they are read)
+    ");
 }
 
 #[test]
@@ -334,12 +340,11 @@ fn what_makes_no_sense_is_one_line() {
         assert!(refused.stderr.contains(message), "{}", refused.stderr);
     });
     let small = bench.call(&words("synthesize frames/a.png --out out --max-pixels 100"));
-    assert_eq!(small.code, Some(1));
-    assert!(
-        small.stderr.contains("--decode max-pixels"),
-        "{}",
-        small.stderr
-    );
+    insta::assert_snapshot!(small.messages(), @"
+    exit code: 1
+    ERROR frames/a.png: 37 × 21 pixels are more than the 100 that are read; shrink it first, or raise --decode
+        max-pixels
+    ");
 }
 
 #[test]
@@ -364,19 +369,19 @@ fn sheets_are_drawn_for_each_frame() {
     let first = image::open(bench.path("out/a_levels.png")).unwrap();
     let other = call("--profile all");
     assert_eq!(other.stdout, "out: 1 made of 1 frame\n");
-    assert!(
-        other
-            .stderr
-            .contains("with other settings; it is made again"),
-        "{}",
-        other.stderr
-    );
+    insta::assert_snapshot!(other.messages(), @"
+    exit code: 0
+     WARN out/a_levels.png: made from another image or with other settings; it is made again
+    ");
     let second = image::open(bench.path("out/a_levels.png")).unwrap();
     assert!(second.height() > first.height(), "no row for each reading");
     first.save(bench.path("out/a_levels.png")).unwrap();
     let refused = call("");
-    assert_eq!(refused.code, Some(1));
-    assert!(refused.stderr.contains("--force"), "{}", refused.stderr);
+    insta::assert_snapshot!(refused.messages(), @"
+    exit code: 1
+    ERROR out/a_levels.png: made from another image or with other settings (images, light: sensor: readings: eld
+        and level and physical); --force overwrites it, another --out keeps both
+    ");
 }
 
 /// The numbers of an exposure in a file or a record.
@@ -546,7 +551,11 @@ fn what_the_camera_cannot_do_is_refused() {
     assert_eq!(far.code, Some(1), "{far:?}");
     assert_eq!(far.stdout, "out: 1 made of 1 frame, 1 failed\n");
     let message = "a.png at T500-motion: --motion: the picture would move by 39";
-    assert!(far.stderr.contains(message), "{}", far.stderr);
+    insta::assert_snapshot!(far.messages(), @"
+    exit code: 1
+    ERROR a.png at T500-motion: --motion: the picture would move by 391.69 pixels during the exposure; at most 256
+        are possible: ask for a shorter exposure, or set a lower speed with --motion speed=…
+    ");
     // An evaluation is refused before anything is asked.
     let run =
         "--data frames --model random --out run --variant motion --levels T500 --motion speed=2000";

@@ -6,6 +6,7 @@ use std::sync::LazyLock;
 
 use super::sensor::{Form, Sensor, Shots, WHITE};
 use super::{Bench, check_rows, measured, refused, write};
+use crate::support::snapshot::redacted;
 
 const SIDE: usize = 256;
 
@@ -157,32 +158,30 @@ fn white_must_be_known() {
     };
     let bench = recording(|_| ());
     let message = refused(&bench, "cam");
-    assert!(
-        message.contains("the code of white is not known: state it with --white"),
-        "{message}"
-    );
+    insta::assert_snapshot!(redacted(&message), @"
+    error: cam: the code of white is not known: state it with --white, or add overexposed frames in SETTING/white/
+    ");
     let mut white = vec![WHITE; SIDE * SIDE];
     white[..SIDE * SIDE * 2 / 3].fill(WHITE - 9);
     frame(&bench, "white/0.pgm", &white);
     let message = refused(&bench, "cam");
-    assert!(
-        message.contains("33.3 % of the samples are at the greatest code, 16383"),
-        "{message}"
-    );
+    insta::assert_snapshot!(redacted(&message), @"
+    error: cam/iso800/white/0.pgm: 33.3 % of the samples are at the greatest code, 16383, and a frame in white/
+        needs 50 %: overexpose it more, or state the code of white with --white
+    ");
     frame(&bench, "white/0.pgm", &vec![WHITE; SIDE * SIDE]);
     frame(&bench, "white/1.pgm", &vec![WHITE - 1; SIDE * SIDE]);
     let message = refused(&bench, "cam");
-    assert!(
-        message.contains("white/1.pgm: white is 16382, but 16383 in"),
-        "{message}"
-    );
+    insta::assert_snapshot!(redacted(&message), @"
+    error: cam/iso800/white/1.pgm: white is 16382, but 16383 in cam/iso800/white/0.pgm: state one code of white
+        with --white
+    ");
     let message = refused(&bench, "cam --white 400");
-    assert!(message.contains("are not below white, 400"), "{message}");
+    insta::assert_snapshot!(redacted(&message), @"
+    error: iso800: bias frames of 512 ADU are not below white, 400; see --white and the folders white/
+    ");
     let message = refused(&bench, &format!("cam --white {WHITE} --black 20000"));
-    assert!(
-        message.contains("--black: the black level 20000 is not below white"),
-        "{message}"
-    );
+    insta::assert_snapshot!(redacted(&message), @"error: --black: the black level 20000 is not below white, 16383");
 }
 
 /// A code of white that the flats speak against is refused or named; overexposed frames may be equal.
@@ -199,10 +198,10 @@ fn white_is_held_against_the_codes() {
     };
     let bench = recording(|_| ());
     let message = refused(&bench, "cam --white 5000");
-    assert!(
-        message.contains("flat-4/00.pgm and ") && message.contains("is above white, 5000"),
-        "{message}"
-    );
+    insta::assert_snapshot!(redacted(&message), @"
+    error: cam/iso800/flat-4/00.pgm and cam/iso800/flat-4/01.pgm: code 10474 is above white, 5000: state the
+        greatest code of the sensor with --white, or see the frames in white/
+    ");
     assert_eq!(warnings(&bench, WHITE), [""; 0]);
     let far = warnings(&bench, 65535);
     assert!(

@@ -7,6 +7,7 @@ use serde_json::Value;
 
 use super::sensor::{BLACK, Form, Sensor, Shots, WHITE};
 use super::{Bench, check_rows, measured, number, refused, write};
+use crate::support::snapshot::redacted;
 
 const SIDE: usize = 256;
 
@@ -239,7 +240,7 @@ fn hot_pixels_are_masked_and_counted() {
     let hot = bias(|_, site, sample| sample + if site % 997 == 5 { 200 } else { 0 });
     let (plain, masked) = (found("plain", &SMALL.1), found("hot", &hot));
     assert_eq!(masked["settings"][0]["hot_pixels"], 66);
-    assert!(warnings(&masked)[0].contains("66 hot pixels (0.101 %) are left out"));
+    insta::assert_snapshot!(redacted(&warnings(&masked)[0]), @"iso800: 66 hot pixels (0.101 %) are left out");
     for (path, allowed) in [
         ("read_shape", 0.003),
         ("read_scale", 0.004),
@@ -284,7 +285,10 @@ fn a_fixed_pattern_is_taken_off_where_there_are_frames() {
     // The mean of 16 frames has noise of its own, which makes what is left a little more normal.
     let ratio = scale(&with_it) / scale(&plain);
     assert!((ratio - 1.0).abs() < 0.04, "{ratio}");
-    assert!(warnings(&with_it)[0].contains("the mean of all bias frames is taken off"));
+    insta::assert_snapshot!(redacted(&warnings(&with_it)[0]), @"
+    iso800: a fixed pattern has 42 % of the variance of the noise: the mean of all bias frames is taken off; the
+        model has no fixed pattern
+    ");
     // What a mean takes with it is given back in both fits: without that, one would be 3 % smaller than the other.
     let plot = |found: &Value| number(found, "/settings/0/plot/scale") / scale(found);
     let ratio = plot(&with_it) / plot(&plain);
@@ -294,7 +298,10 @@ fn a_fixed_pattern_is_taken_off_where_there_are_frames() {
         ..fixed
     };
     let few = found("few", &few);
-    assert!(warnings(&few)[0].contains("σ_TL holds it, too; with 16 bias frames or more"));
+    insta::assert_snapshot!(redacted(&warnings(&few)[0]), @"
+    iso800: a fixed pattern has 42 % of the variance of the noise: σ_TL holds it, too; with 16 bias frames or more
+        their mean is taken off; the model has no fixed pattern
+    ");
     assert!(scale(&few) > 1.1 * scale(&plain));
 }
 

@@ -7,6 +7,7 @@ use darkqa_ground::types::Rgb;
 
 use super::{fault, image, loaded, open};
 use crate::support::onnx;
+use crate::support::snapshot::redacted;
 use crate::support::table::check_rows;
 
 #[test]
@@ -51,7 +52,10 @@ fn an_image_that_takes_too_long_is_an_error_and_others_go_on() {
         assert!(message.contains("longer than"), "{message}");
     }
     let message = enhancer.enhance(&dark).unwrap_err().to_string();
-    assert!(message.contains("is no longer run"), "{message}");
+    insta::assert_snapshot!(redacted(&message), @"
+    [TMP]/model.onnx: is no longer run, because 3 images in a row exceeded the limit of time or memory
+        (--llie-options timeout, max-memory)
+    ");
     assert_eq!(enhancer.sizes().too_long, 5);
 }
 
@@ -69,7 +73,10 @@ fn an_image_that_takes_too_much_memory_is_an_error_and_others_go_on() {
         assert!(message.contains("--llie-options max-memory"), "{message}");
     }
     let message = enhancer.enhance(&dark).unwrap_err().to_string();
-    assert!(message.contains("is no longer run"), "{message}");
+    insta::assert_snapshot!(redacted(&message), @"
+    [TMP]/model.onnx: is no longer run, because 3 images in a row exceeded the limit of time or memory
+        (--llie-options timeout, max-memory)
+    ");
     assert_eq!(enhancer.sizes().too_long, 0);
 }
 
@@ -86,5 +93,9 @@ fn a_file_that_is_too_new_for_the_library_says_so() {
             "{message}"
         );
     }
-    assert!(fault(&onnx::no_image()).contains("24 channels"));
+    insta::assert_snapshot!(redacted(&fault(&onnx::no_image())), @r#"
+    [TMP]/model.onnx: gives "curves" (float32 [1, 24, height, width]), 24 channels, but an image has 3; if they
+        are the curves of Zero-DCE, add to model.onnx.toml next to it: `image = "curves(input, curves[0:3],
+        curves[3:6], curves[6:9], curves[9:12], curves[12:15], curves[15:18], curves[18:21], curves[21:24])"`
+    "#);
 }

@@ -14,6 +14,7 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use crate::support::onnx::{self, Graph};
+use crate::support::snapshot::redacted;
 use darkqa_enhance::{Enhancer, Install, ModelFile, Runtime, RuntimeSearch};
 use darkqa_ground::types::Rgb;
 use tempfile::TempDir;
@@ -84,10 +85,11 @@ fn the_runtime_is_opened_once() {
         install: Install::Offline,
     };
     let message = other.open().err().unwrap().to_string();
-    assert!(
-        message.contains("this process has already loaded"),
-        "{message}"
-    );
+    insta::assert_snapshot!(redacted(&message), @"
+    ONNX Runtime: [TMP]/other.so cannot be loaded, because this process has already loaded
+        /root/.cache/darkqa-eval/onnxruntime/1.31.1/libonnxruntime.so.1.31.1; name a library of 1.17 or later with
+        --llie-options ort-lib=FILE or ORT_DYLIB_PATH, or leave both out to search for one
+    ");
 }
 
 #[test]

@@ -60,7 +60,12 @@ fn a_right_model_is_asked_and_its_ranges_are_confirmed() {
     let page = fs::read_to_string(bench.path("run/report.html")).unwrap();
     assert!(page.contains("fed 0..1 (assumed)"), "the page says how");
     assert!(page.contains("model: 0..1 assumed."), "the page warns");
-    assert!(called.stderr.contains("0..1 out assumed"), "{called:?}");
+    insta::assert_snapshot!(called.messages(), @r#"
+    exit code: 0
+     WARN model: value ranges of 0..1 in and 0..1 out assumed, because nothing sets them; its images of dark
+        frames are plausible. To confirm, add to model.onnx.toml next to it: `range_in = "0..1"` and `range_out =
+        "0..1"`
+    "#);
 }
 
 #[test]
@@ -131,8 +136,13 @@ fn sets_for_other_tools_are_not_made_with_it_either() {
     let bench = bench(&onnx::negative(), "");
     let line = "export llava rooms --out sets --llie model.onnx --levels L3 --limit 3";
     let called = bench.call(&words(line));
-    assert_eq!(called.code, Some(2), "{called:?}");
-    assert!(called.stderr.contains("bright where"), "{called:?}");
+    insta::assert_snapshot!(called.messages(), @r#"
+    exit code: 2
+    error: model.onnx: on 3 of 3 dark frames its images are bright where the frames are dark (rank correlation
+        -1.00). Its output may not be the image itself; add to model.onnx.toml next to it the line that the
+        model's code uses: `image = "1 - output"` (if it is the negative). `darkqa-eval enhance doctor model.onnx
+        IMAGES… --out DIR` tries each value range and colour order; --allow bad-enhancer uses it anyway
+    "#);
     bench.complete(&words(&format!("{line} --llie-anyway")));
 }
 
@@ -166,8 +176,14 @@ fn a_normalised_input_is_found() {
     let bench = bench(&graph, "");
     let called = ask(&bench, "");
     assert_eq!(called.code, Some(2), "{called:?}");
-    let lines = "`mean = [0.485, 0.456, 0.406]` and `std = [0.229, 0.224, 0.225]` and `range_out = \"0..1\"`";
-    assert!(called.stderr.contains(lines), "{called:?}");
+    insta::assert_snapshot!(called.messages(), @r#"
+    exit code: 2
+    error: model.onnx: on 6 of 6 dark frames its images are flat (brightness varies by 0.6 of 255). With 0..1 with
+        the mean and std of ImageNet in and 0..1 out (black becomes 0 of 255, white 255) they are plausible; if
+        the model's code uses these, add to model.onnx.toml next to it: `mean = [0.485, 0.456, 0.406]` and `std =
+        [0.229, 0.224, 0.225]` and `range_out = "0..1"`. `darkqa-eval enhance doctor model.onnx IMAGES… --out DIR`
+        tries each value range and colour order; --allow bad-enhancer uses it anyway
+    "#);
     let stated = self::bench(
         &graph,
         "mean = [0.485, 0.456, 0.406]\nstd = [0.229, 0.224, 0.225]\n",
@@ -236,9 +252,14 @@ fn advised(graph: &Graph, lines: &str) {
 fn images_without_colour_are_refused() {
     let bench = bench(&onnx::colourless(), "");
     let called = ask(&bench, "");
-    assert_eq!(called.code, Some(2), "{called:?}");
-    assert!(called.stderr.contains("have no colour"), "{called:?}");
-    assert!(called.stderr.contains("enhanced luma"), "{called:?}");
+    insta::assert_snapshot!(called.messages(), @r#"
+    exit code: 2
+    error: model.onnx: on 6 of 6 dark frames its images have no colour, unlike the frames (channels differ by 0.0
+        of 255). Its output may not be the image itself; add to model.onnx.toml next to it the line that the
+        model's code uses: `image = "input / max(output, 0.001)"` (if it is a light map); if it is the enhanced
+        luma, export it joined with the colours. `darkqa-eval enhance doctor model.onnx IMAGES… --out DIR` tries
+        each value range and colour order; --allow bad-enhancer uses it anyway
+    "#);
 }
 
 #[test]
@@ -264,15 +285,24 @@ fn a_wrong_statement_is_found_too() {
 fn a_model_that_does_nothing_is_used_only_if_its_ranges_are_stated() {
     let unstated = bench(&onnx::identity(), "");
     let called = ask(&unstated, "");
-    assert_eq!(called.code, Some(2), "{called:?}");
-    assert!(called.stderr.contains("not brighter"), "{called:?}");
+    insta::assert_snapshot!(called.messages(), @r#"
+    exit code: 2
+    error: model.onnx: on 6 of 6 dark frames its images are not brighter than the dark frames (mean brightness
+        +0.0 of 255). If its images should be this dim, add to model.onnx.toml next to it: `range_in = "0..1"` and
+        `range_out = "0..1"`. `darkqa-eval enhance doctor model.onnx IMAGES… --out DIR` tries each value range and
+        colour order; --allow bad-enhancer uses it anyway
+    "#);
     let stated = bench(
         &onnx::identity(),
         "range_in = \"0..1\"\nrange_out = \"0..1\"",
     );
     let called = ask(&stated, "");
-    assert_eq!(called.code, Some(0), "{called:?}");
-    assert!(called.stdout.contains("not brighter"), "{called:?}");
+    insta::assert_snapshot!(called.lines_with("not brighter"), @"
+    exit code: 0
+      are not brighter than the dark frames (mean brightness +0.0 of 255).
+     WARN model: on 6 of 6 dark frames its images are not brighter than the dark frames (mean brightness +0.0 of
+        255)
+    ");
 }
 
 /// With red and blue swapped, several ranges are plausible: the stated ones are kept.
@@ -285,13 +315,14 @@ fn the_doctor_finds_a_wrong_order_of_colours_beside_stated_ranges() {
     bench.file("model.onnx.toml", right + "\ncolor_out = \"bgr\"\n");
     bench.rooms("rooms", 6, "144x96");
     let called = bench.call(&words("enhance model.onnx rooms --out enhanced"));
-    assert_eq!(called.code, Some(2), "{called:?}");
-    assert!(
-        called
-            .stderr
-            .contains("replacing the present values: `color_out = \"rgb\"`"),
-        "{called:?}"
-    );
+    insta::assert_snapshot!(called.messages(), @r#"
+    exit code: 2
+    error: model.onnx: on 4 of 6 dark frames its images are blue where the frames are red (cosine -0.97). With
+        0..1 in and 0..1 out and RGB in the output its images are plausible; or with it in the input: `color =
+        "rgb"` and the other order for `color_out`. If the model's code does that, add to model.onnx.toml next to
+        it, replacing the present values: `color_out = "rgb"`. `darkqa-eval enhance doctor model.onnx IMAGES…
+        --out DIR` tries each value range and colour order; --allow bad-enhancer uses it anyway
+    "#);
     let called = bench.call(&words("enhance --doctor model.onnx rooms --out doctor"));
     assert_eq!(called.code, Some(0), "{called:?}");
     let page = fs::read_to_string(bench.path("doctor/doctor.html")).unwrap();

@@ -2,6 +2,7 @@
 
 use super::rows::{column, csv};
 use super::*;
+use crate::support::snapshot::lines_with;
 
 const FIXED: [&str; 3] = ["--variant", "noise", "--fixed"];
 
@@ -109,11 +110,10 @@ fn what_is_not_the_noise_of_a_sensor_is_not_fitted() {
         "out",
     ];
     let table = bench.complete(&[&["realism", "pairs"], &arguments[..]].concat());
-    assert!(
-        table
-            .contains("as saved; a smaller K than the sensor's means that noise was averaged away"),
-        "{table}"
-    );
+    insta::assert_snapshot!(lines_with(&table, "smaller K"), @"
+    System gain K by the spread of smooth blocks, as saved; a smaller K than the sensor's means that noise was
+        averaged away
+    ");
     let refused = "bare, physical: K 0.02, misfit";
     assert!(table.contains(refused), "{table}");
     let reason = "no fit, as the ladder of K ends here: the low image's noise is not a sensor's under this reading";
@@ -129,7 +129,11 @@ fn what_is_not_the_noise_of_a_sensor_is_not_fitted() {
     let none = bench.call(&words);
     assert_eq!(none.code, Some(0), "{none:?}");
     assert!(!bench.path("none/fitted.toml").exists());
-    assert!(none.stderr.contains("fitted.toml: not written"), "{none:?}");
+    insta::assert_snapshot!(none.messages(), @"
+    exit code: 0
+     WARN pairs/normal/averaged.png: no partner in the other light
+     WARN none/fitted.toml: not written, because no pair is fitted under paper
+    ");
     assert!(!none.stdout.contains("gain fitted"), "{}", none.stdout);
 }
 
@@ -165,15 +169,21 @@ fn no_pair_is_judged_by_its_own_gain() {
         bench.complete(&[&["realism", folder, "--out", out], &FIT[..]].concat())
     };
     let marked = fit("others", "two");
-    assert!(
-        marked.contains("physical, gain fitted to the same pairs"),
-        "{marked}"
-    );
+    insta::assert_snapshot!(lines_with(&marked, "gain fitted"), @"
+     with sensor noise, physical, gain fitted to the same pairs   40.69     0.9347   0.001    0.0          0.001
+     physical, gain fitted to the same pairs   +0.91     −0.0119   −11.513       2
+    one: with noise, physical, gain fitted to the same pairs: PSNR 40.56 SSIM 0.9327 D_KL 0.002
+    two: with noise, physical, gain fitted to the same pairs: PSNR 40.83 SSIM 0.9366 D_KL 0.000
+    ");
     let table = fit("pairs", "three");
-    assert!(
-        table.contains("physical, gain fitted to the other pairs"),
-        "{table}"
-    );
+    insta::assert_snapshot!(lines_with(&table, "gain fitted"), @"
+     with sensor noise, physical, gain fitted to the other pairs   33.18 ±6.58    0.7240 ±0.2830   0.703 ±1.271
+        0.0 ±0.0     0.703 ±1.271
+     physical, gain fitted to the other pairs   −3.46 ±7.89   −0.1076 ±0.2572   −11.588 ±2.113       3
+    loud: with noise, physical, gain fitted to the other pairs: PSNR 30.44 SSIM 0.6029 D_KL 1.283
+    one: with noise, physical, gain fitted to the other pairs: PSNR 35.73 SSIM 0.8290 D_KL 0.313
+    two: with noise, physical, gain fitted to the other pairs: PSNR 33.37 SSIM 0.7401 D_KL 0.514
+    ");
     let judged = of_pair(&bench, "three/pairs.csv", "loud", "other-pairs");
     for (camera, is_same) in [("two/fitted.toml", true), ("three/fitted.toml", false)] {
         let words = ["realism", "pairs", "--ev", "4", "--profile", "physical"];
@@ -251,9 +261,13 @@ fn a_gain_is_not_both_pinned_and_fitted() {
     let bench = Bench::new();
     pair(&bench, "a", 1);
     let refused = bench.call(&["realism", "pairs", "--fit", "--gain", "1"]);
-    assert_eq!(refused.code, Some(2), "{refused:?}");
-    assert!(refused.stderr.contains("--noise gain"), "{refused:?}");
+    insta::assert_snapshot!(refused.messages(), @"
+    exit code: 2
+    error: the argument '--fit' cannot be used with '--noise gain=<K>'
+    ");
     // 96 blocks of 8 × 8 pixels are 12 in a bin.
     let few = bench.complete(&["realism", "pairs", "--fit"]);
-    assert!(few.contains("a, paper: no fit: too few blocks"), "{few}");
+    insta::assert_snapshot!(lines_with(&few, "no fit"), @"
+    a, paper: no fit: too few blocks of 8 × 8 pixels are smooth, and neither black nor white
+    ");
 }

@@ -128,12 +128,10 @@ fn files_hold_every_pair() {
     )
     .unwrap();
     let table = bench.call(&["realism", "pairs", "--out", "out"]);
-    assert_eq!(table.code, Some(0), "{table:?}");
-    assert!(
-        table.stderr.contains("stray.png: no partner"),
-        "{}",
-        table.stderr
-    );
+    insta::assert_snapshot!(table.messages(), @"
+    exit code: 0
+     WARN pairs/low/stray.png: no partner in the other light
+    ");
     let rows = [
         "exposure drop alone",
         "with sensor noise",
@@ -169,8 +167,15 @@ fn equal_images_are_told_as_such() {
     )
     .unwrap();
     let table = bench.call(&["realism", "pairs", "--ev", "0"]);
-    assert!(table.stdout.contains('∞'), "{}", table.stdout);
-    assert!(table.stderr.contains("--ev 0: below 0.5 EV"), "{table:?}");
+    insta::assert_snapshot!(table.lines_with("∞"), @"
+    exit code: 0
+     exposure drop alone        ∞         1.0000   0.000   0.0          0.000
+     paper                         −∞        −0.5639   +5.268       1
+    ");
+    insta::assert_snapshot!(table.messages(), @"
+    exit code: 0
+     WARN --ev 0: below 0.5 EV both images have nearly the same light
+    ");
     let summary = json(&bench, &["--ev", "0"]);
     assert_eq!(summary["exposure"]["psnr"]["value"], Value::Null);
     assert!(summary["exposure"]["kl"]["value"].as_f64().unwrap().abs() < 1e-9);
@@ -185,13 +190,14 @@ fn a_broken_pair_does_not_stop_the_others() {
         .save(bench.path("pairs/low/b.png"))
         .unwrap();
     let called = bench.call(&["realism", "pairs"]);
-    assert_eq!(called.code, Some(1), "{called:?}");
-    assert!(
-        called.stderr.contains("b: ") && called.stderr.contains("20 × 20"),
-        "{}",
-        called.stderr
-    );
-    assert!(called.stdout.contains("1 pair failed"));
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 1
+    ERROR b: pair: 96 × 64 pixels against 20 × 20; both images of a pair must have the same size
+    ");
+    insta::assert_snapshot!(called.lines_with("pair failed"), @"
+    exit code: 1
+    1 pair failed
+    ");
     let rows = [
         (&["realism", "nowhere"][..], "nowhere"),
         (&["realism", "pairs/low"], "--normal DIR"),
