@@ -11,6 +11,7 @@ use crate::support::endpoint::{Answer, MockEndpoint};
 #[cfg(unix)]
 use crate::support::process::{signal, wait_until};
 use crate::support::run::{Bench, Called, model_args, records, words};
+use crate::support::snapshot::{lines_with, redacted};
 use crate::support::table::{check_rows, check_rows_at_once};
 
 const PRICES: &str = "as-of = \"2026-01-01\"\nbatch = 0.5\n[models]\nm = { input = 1000, output = 0, image-tokens = 70 }\n";
@@ -31,8 +32,11 @@ fn a_dry_run_sends_nothing_and_leaves_nothing() {
     let base = mock.base_url();
     let dry = args(&base, "--out run --dry-run");
     let table = bench.complete(&dry);
-    assert!(table.contains("3 of 3 trials are left to ask"), "{table}");
-    assert!(table.contains("unknown"), "no price, no family: {table}");
+    insta::assert_snapshot!(lines_with(&table, "trials"), @"Nothing was sent. 3 of 3 trials are left to ask.");
+    insta::assert_snapshot!(lines_with(&table, "unknown"), @"
+     m              3           112        unknown     12 – 3,072   unknown
+    unknown: state the price of a model and its image-tokens in a table of --prices FILE
+    ");
     assert!(mock.requests().is_empty());
     assert!(!bench.path("run").exists());
 
@@ -56,7 +60,13 @@ fn a_dry_run_sends_nothing_and_leaves_nothing() {
     // What is answered is not counted again.
     bench.complete(&args(&base, "--out run --limit 3"));
     let table = bench.complete(&args(&base, "--out run --limit 3 --dry-run"));
-    assert!(table.contains("0 of 3 trials are left to ask"), "{table}");
+    insta::assert_snapshot!(redacted(&table), @"
+    Nothing was sent. 0 of 3 trials are left to ask.
+    power: 3 questions detects no difference between two conditions; 5 points need about 794 questions (one model;
+        level 3.33 % after correction; assumed: 20 % of answers change without an effect, correlation 0.05 in a
+        question)
+    only 1 frame (8 are needed): intervals and tests would be rough
+    ");
 }
 
 #[test]
@@ -71,15 +81,15 @@ fn a_run_stops_before_it_costs_too_much_and_goes_on_with_more() {
         bench.call(&args(&base, &more))
     };
     let stopped = call("0.5");
-    assert_eq!(stopped.code, Some(3), "{stopped:?}");
-    assert!(stopped.stderr.contains("--max-cost"), "{stopped:?}");
-    assert!(
-        stopped
-            .stdout
-            .contains("over budget: 5 of 12 trials answered"),
-        "{}",
-        stopped.stdout
-    );
+    insta::assert_snapshot!(stopped.messages(), @"
+    exit code: 3
+     WARN stopped: one more question could exceed the $0.5000 of --max-cost; the same command with a higher limit
+        continues
+    ");
+    insta::assert_snapshot!(stopped.lines_with("over budget"), @"
+    exit code: 3
+    ! run: over budget: 5 of 12 trials answered, 0 failed. The same command asks the
+    ");
     let again = call("0.5");
     assert_eq!(
         (again.code, mock.requests().len()),
@@ -95,8 +105,11 @@ fn a_run_stops_before_it_costs_too_much_and_goes_on_with_more() {
 fn a_limit_needs_a_price() {
     let bench = Bench::with_questions(1);
     let refused = bench.call(&args("http://127.0.0.1:9/v1", "--max-cost 1"));
-    assert_eq!(refused.code, Some(2));
-    assert!(refused.stderr.contains("--prices FILE"), "{refused:?}");
+    insta::assert_snapshot!(refused.messages(), @"
+    exit code: 2
+    error: --max-cost: the price of m is not in the table of [DATE]; add it to your own table and name that with
+        --prices FILE, or set price in a file of models
+    ");
     check_rows(["0", "-1", "NaN"], |wrong| {
         let flag = format!("--max-cost={wrong}");
         assert_eq!(
@@ -112,11 +125,11 @@ fn an_image_beyond_the_limit_is_found_before_anything_is_asked() {
     let mock = MockEndpoint::start([Answer::text("C")]);
     let base = mock.base_url();
     let refused = bench.call(&args(&base, "--max-image 0.00005"));
-    assert_eq!(refused.code, Some(2), "{refused:?}");
-    assert!(
-        refused.stderr.contains("frame") && refused.stderr.contains("--image max-side"),
-        "{refused:?}"
-    );
+    insta::assert_snapshot!(refused.messages(), @"
+    exit code: 2
+    error: frame a.png at L0: 64 × 48 pixels are 0.0 MB as png, more than the 0.00005 MB of --image max-mb; make
+        it smaller with --image max-side=N, or with --image jpeg:95, or set another limit with --image max-mb
+    ");
     assert!(mock.requests().is_empty());
 }
 
@@ -530,10 +543,19 @@ fn the_report_has_the_prices_that_the_run_had() {
         before[before.len() - 40..].to_owned()
     };
     let printed = bench.complete(&args(&base, "--out run --prices prices.toml"));
-    assert!(
-        printed.contains("cost: $1.00 at the prices of 2026-01-01"),
-        "{printed}"
-    );
+    insta::assert_snapshot!(redacted(&printed), @"
+    m · 1 question · 1 frame · 1 reply, 0 failed · intervals by question
+    ! Only 1 question (8 are needed): intervals and tests are rough.
+
+     accuracy in %
+     m            L0   95 %
+     untouched 100.0   −79.3 0.0
+     95 %: how far the widest interval of the row reaches down and up
+     chance 33.3
+    run: run
+    cost: $1.00 at the prices of [DATE] of --prices
+    report: run/report.html
+    ");
     let stated = cost();
     assert!(
         stated.ends_with("$1.00 at the prices of 2026-01-01"),
@@ -546,7 +568,9 @@ fn the_report_has_the_prices_that_the_run_had() {
     // The same run goes on with these prices, and says so where they are a limit.
     let limited = bench.call(&args(&base, "--out run --max-cost 5"));
     assert_eq!(limited.code, Some(0), "{limited:?}");
-    let note = "the prices that the run folder keeps";
-    assert!(limited.stderr.contains(note), "{limited:?}");
+    insta::assert_snapshot!(limited.messages(), @"
+    exit code: 0
+     WARN --max-cost counts with the prices that the run folder keeps; --prices FILE names others
+    ");
     assert_eq!(cost(), stated);
 }

@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 
 use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::run::{Bench, Called, model_args};
+use crate::support::snapshot::redacted;
 
 const FRAMES: usize = 30;
 const CHOICES: [&[&str]; 4] = [
@@ -102,7 +103,11 @@ fn dropped_images_are_the_first_alert_and_said_during_the_run() {
     assert_eq!(alerts[0]["kind"], "image_ignored", "{alerts:?}");
     let text = alerts[0]["text"].as_str().unwrap();
     assert!(text.starts_with(words));
-    assert!(text.contains("exact binomial test: p < 0.0001"), "{text}");
+    insta::assert_snapshot!(redacted(&text), @"
+    The replies of m do not depend on the image: 84 of 84 replies to untouched images are the usual reply to the
+        wording although another answer is true (120 replies, 4 wordings, exact binomial test: p < 0.0001). The
+        server may drop images, or cache replies by the text.
+    ");
 }
 
 #[test]

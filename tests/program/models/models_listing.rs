@@ -158,11 +158,10 @@ fn tables_are_divided_by_groups() {
     assert_eq!(mock.requests().len(), asked);
     bench.file("models.toml", table("big", &url, "group = \" \""));
     let called = bench.call(&words(RUN));
-    assert_eq!(called.code, Some(2), "{called:?}");
-    assert!(
-        called.stderr.contains("line 5: group: a text expected"),
-        "{called:?}"
-    );
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 2
+    error: models.toml, line 5: group: a text expected
+    ");
     assert_eq!(records(&bench.path("run")).len(), asked);
 }
 

@@ -122,10 +122,11 @@ fn a_file_that_came_with_the_data_takes_nothing_that_is_not_its_own() {
         table("m", OPENAI, "")
     );
     let refused = strange(&defaults, "", &key);
-    assert!(
-        refused.stderr.contains("line 2: key-env: AWS_SECRET"),
-        "{refused:?}"
-    );
+    insta::assert_snapshot!(refused.messages(), @"
+    exit code: 2
+    error: ../data/models.toml, line 2: key-env: AWS_SECRET is not a variable of api.openai.com's own tools, and
+        the file may have come with the data from someone else; --allow models-file states that you trust it
+    ");
     assert_eq!(strange(&table("m", ELSEWHERE, ""), "", &[]).code, Some(0));
 }
 
@@ -338,13 +339,13 @@ fn a_table_of_vendors_says_how_a_host_is_asked() {
     bench.file("vendors.toml", row.replace("header", "headr"));
     let line = format!("{line} --vendor vendors.toml");
     let refused = bench.call(&words(&line));
-    assert_eq!(refused.code, Some(2), "{refused:?}");
-    assert!(
-        refused
-            .stderr
-            .contains("--vendor: vendors.toml: line 5: unknown field `headr`"),
-        "{refused:?}"
-    );
+    insta::assert_snapshot!(refused.messages(), @"
+    exit code: 2
+    error: --vendor: vendors.toml: line 5: unknown field `headr`, expected one of `name`, `hosts`, `key`,
+        `key-form`, `header`, `token-field`, `thinks-beyond-limit`, `image-bytes`, `image-side`, `images`,
+        `image-side-many`, `request-bytes`, `logprobs`, `batch`, `constrain`, `pin`, `account`, `addresses`; did
+        you mean header?; expected tables [[vendor]] with name, hosts and key, as in src/ask/vendors.toml
+    ");
 }
 
 #[test]

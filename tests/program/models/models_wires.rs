@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 
 use crate::support::endpoint::{Answer, MockEndpoint, Request};
 use crate::support::run::{Bench, Called, model_args, records, words};
+use crate::support::snapshot::redacted;
 
 const RUN: &str = "--models models.toml --data set.jsonl --levels L0 --retries 0 --out run";
 
@@ -84,7 +85,7 @@ fn each_model_has_its_own_wire_and_its_own_words() {
     assert_eq!(run.code, Some(0), "{run:?}");
     let requests = mock.requests();
     let sent = by_model(&requests);
-    assert!(sent["response"].line.contains("/v1/responses "));
+    insta::assert_snapshot!(redacted(&sent["response"].line), @"POST /v1/responses HTTP/1.1");
     let response = sent["response"].json();
     assert_eq!(response["instructions"], "Be brief.");
     assert_eq!(response["input"].as_array().unwrap().len(), 1);
@@ -167,12 +168,11 @@ fn a_model_is_above_the_flag_for_probabilities() {
     let models = table("with", &url, "") + &table("without", &url, "probabilities = false");
     let bench = bench(&models);
     let run = call(&bench, "--probabilities");
-    assert_eq!(run.code, Some(0), "{run:?}");
-    assert!(
-        run.stderr.contains("models with their own probabilities"),
-        "{}",
-        run.stderr
-    );
+    insta::assert_snapshot!(run.messages(), @"
+    exit code: 0
+     WARN models.toml: models with their own probabilities are not changed; the flag applies to the others (--set
+        NAME.KEY=VALUE overrides both)
+    ");
     let requests = mock.requests();
     let sent = by_model(&requests);
     assert_eq!(sent["with"].json()["top_logprobs"], 20);
@@ -183,14 +183,11 @@ fn a_model_is_above_the_flag_for_probabilities() {
         table("hot", &url, "temperature = 1\nprobabilities = true"),
     );
     let refused = call(&bench, "--dry-run");
-    assert_eq!(refused.code, Some(2), "{refused:?}");
-    assert!(
-        refused
-            .stderr
-            .contains("models.toml, line 2: hot: --request probabilities"),
-        "{}",
-        refused.stderr
-    );
+    insta::assert_snapshot!(refused.messages(), @"
+    exit code: 2
+    error: models.toml, line 2: hot: --request probabilities: the probabilities of tokens depend on the
+        temperature: --temperature 0, auto or default expected
+    ");
 }
 
 #[test]

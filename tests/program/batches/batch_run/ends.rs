@@ -124,11 +124,11 @@ fn a_batch_that_is_cancelled_elsewhere_is_asked_again() {
 fn a_batch_that_the_server_cannot_begin_stops_the_run() {
     let failing = Course::failing("invalid_json_line", "this line is no JSON", &json!(3));
     let (bench, mock, called) = blind(&[failing, Course::of("completed")], "");
-    assert_eq!(called.code, Some(2), "{called:?}");
-    assert!(
-        called.stderr.contains("line 3: this line is no JSON"),
-        "{called:?}"
-    );
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 2
+    error: http://127.0.0.1:[PORT]/v1: part-1-m-001.jsonl: the batch batch_1 failed: line 3: this line is no JSON
+        (invalid_json_line); none of its requests has a reply
+    ");
     // Its requests are free: the same command asks them.
     let called = call_with(BLIND, &bench, &mock, "");
     assert_eq!(called.code, Some(0), "{called:?}");
@@ -243,11 +243,11 @@ fn a_file_that_was_edited_is_not_uploaded() {
     let text = std::fs::read_to_string(&path).unwrap();
     std::fs::write(&path, text.replace("color", "hue")).unwrap();
     let called = call_with(BLIND, &bench, &mock, "");
-    assert_eq!(called.code, Some(2), "{called:?}");
-    assert!(
-        called.stderr.contains("was changed after it was written"),
-        "{called:?}"
-    );
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 2
+    error: run/batch/part-1-m-001.jsonl: the file was changed after it was written: 1660 bytes expected; batch
+        cancel run frees its requests
+    ");
     assert_eq!(mock.count("POST files"), 0);
 }
 
@@ -280,10 +280,11 @@ fn a_batch_api_of_another_form_is_refused_before_anything_is_sent() {
 fn the_purpose_of_files_is_that_of_the_server_unless_it_is_stated() {
     let (_, mock, called) = blind(&[Course::of("completed")], "--purpose batch-api");
     assert_ne!(called.code, Some(0), "{called:?}");
-    assert!(
-        called.stderr.contains("the purpose must be batch"),
-        "{called:?}"
-    );
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 2
+    error: http://127.0.0.1:[PORT]/v1: part-1-m-001.jsonl: http://127.0.0.1:[PORT]/v1 answered 400: the purpose
+        must be batch; the batches of this run stay as they are, and the same command continues
+    ");
     assert_eq!(mock.count("POST batches"), 0);
     let (_, mock, called) = blind(&[Course::of("completed")], "");
     assert_eq!((called.code, mock.count("POST batches")), (Some(0), 1));

@@ -61,7 +61,18 @@ fn a_file_of_the_servers_page_ends_the_wait() {
     let line = format!(r#"{{"custom_id":"{id}","response":{{"status_code":200,"body":{body}}}}}"#);
     bench.file("page.jsonl", line + "\n");
     let imported = bench.call(&words("batch import run page.jsonl"));
-    assert!(imported.stdout.contains("1 imported"), "{imported:?}");
+    insta::assert_snapshot!(imported, @"
+    exit code: 0
+    stdout:
+    replies: 1 imported, 0 failed
+    m · 4 questions · 1 frame · 4 replies, 0 failed · intervals by question
+    ! Only 4 questions (8 are needed): intervals and tests are rough.
+
+     accuracy in %
+     without images: m 100.0 [51.0, 100.0] · chance 33.3
+    run: run
+    report: run/report.html
+    ");
     let called = call_with(BLIND, &bench, &mock, "");
     assert_eq!(called.code, Some(0), "{called:?}");
     assert_each_once(&bench, &mock, QUESTIONS);
@@ -77,7 +88,15 @@ fn an_output_that_is_deleted_ends_with_a_message() {
     }
     let called = call_with(BLIND, &bench, &mock, "");
     assert_stopped(&mock, &called, "deleted");
-    assert!(called.stderr.contains("No such File object"), "{called:?}");
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 2
+     WARN part-1-m-001.jsonl: batch batch_1: its file file-2 cannot be fetched: http://127.0.0.1:[PORT]/v1
+        answered 404: No such File object; looked at again
+    error: http://127.0.0.1:[PORT]/v1: part-1-m-001.jsonl: batch batch_1: its file file-2 cannot be fetched:
+        http://127.0.0.1:[PORT]/v1 answered 404: No such File object; nothing is asked again or deleted. The same
+        command looks again; batch import run FILE imports a file of the server's page; batch cancel run frees the
+        rest
+    ");
 }
 
 /// A server that counts only some of the requests of a batch that it calls completed.
@@ -93,8 +112,12 @@ fn fetch_imports_nothing_of_an_incomplete_batch() {
     let courses = [Course::of("completed").order(Order::Cut)];
     let (bench, mock, _) = blind(&courses, "--detach");
     let fetched = bench.call(&words("batch fetch run"));
-    assert_eq!(fetched.code, Some(1), "{fetched:?}");
-    assert!(fetched.stderr.contains("look again later"), "{fetched:?}");
+    insta::assert_snapshot!(fetched.messages(), @"
+    exit code: 1
+     WARN part-1-m-001.jsonl: batch batch_1: the server counts 4 replies, and its files have 3; nothing is
+        imported, asked again or deleted; look again later (the command of the run without --detach, or batch
+        cancel, ends the wait)
+    ");
     assert_eq!(
         (answered(&bench).len(), mock.count("DELETE files/id")),
         (0, 0)
@@ -133,10 +156,10 @@ fn a_cancelled_batch_is_fetched_before_its_files_are_deleted() {
         .late(3);
     let (bench, _mock, _) = blind(&[course, Course::of("completed")], "--detach");
     let cancelled = bench.call(&words("batch cancel run --poll 0.02"));
-    assert!(
-        cancelled.stdout.contains("cancelled: 1 answered, 3 not"),
-        "{cancelled:?}"
-    );
+    insta::assert_snapshot!(cancelled.lines_with("cancelled"), @"
+    exit code: 1
+    part-1-m-001.jsonl: 4 requests to m, batch_1, cancelled: 1 answered, 3 not
+    ");
     assert_eq!(answered(&bench).len(), 1);
 }
 
@@ -147,10 +170,12 @@ fn files_of_a_cancelled_batch_stay_if_they_are_incomplete() {
         .late(1000);
     let (bench, mock, _) = blind(&[course], "--detach");
     let cancelled = bench.call(&words("batch cancel run --poll 0.02"));
-    assert!(
-        cancelled.stderr.contains("its files stay at the server"),
-        "{cancelled:?}"
-    );
+    insta::assert_snapshot!(cancelled.messages(), @"
+    exit code: 1
+     WARN part-1-m-001.jsonl: batch batch_1: the server counts 1 replies, and its files have 0; looked at again
+     WARN part-1-m-001.jsonl: batch batch_1: the server counts 1 replies, and its files have 0; its files stay at
+        the server, and its requests may be asked and paid again
+    ");
     assert_eq!(mock.count("DELETE files/id"), 0);
 }
 
@@ -160,12 +185,11 @@ fn lost_trials_of_a_batch_are_not_paid_again() {
     let (bench, mock, _) = blind(&[course, Course::of("completed")], "--detach");
     std::fs::remove_file(bench.path("run/batch/trials.jsonl")).unwrap();
     let called = call_with(BLIND, &bench, &mock, "");
-    assert_eq!(called.code, Some(2), "{called:?}");
-    assert!(
-        called
-            .stderr
-            .contains("4 trials of part-1-m-001.jsonl, whose batch is at the server, are missing"),
-        "{called:?}"
-    );
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 2
+    error: run/batch/trials.jsonl: 4 trials of part-1-m-001.jsonl, whose batch is at the server, are missing:
+        restore this file from a copy; without it they would be asked and paid again. Without a copy, cancel the
+        batch on the server's page and delete run/batch
+    ");
     assert_eq!(mock.count("POST batches"), 1);
 }

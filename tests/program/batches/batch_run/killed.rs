@@ -241,10 +241,12 @@ fn an_interrupt_leaves_the_batches_working() {
         &mock,
         "",
     );
-    assert!(
-        called.stderr.contains("4 trials are waiting for a batch"),
-        "{called:?}"
-    );
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 1
+     WARN 4 trials are waiting for a batch and not asked here; import the replies with batch run, batch fetch or
+        batch import; batch cancel run ends what batch run has submitted, and frees it; or delete run/batch to ask
+        here
+    ");
     assert_eq!(mock.count("POST chat/completions"), 0);
     mock.with(Server::end_batches);
     let called = call_with(BLIND, &bench, &mock, "");

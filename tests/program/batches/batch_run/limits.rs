@@ -81,8 +81,12 @@ fn a_part_that_is_too_large_for_the_quota_is_divided() {
     let tiny = Course::refused(Answer::error(429, "x", "enqueued tokens: Limit: 7 tokens"));
     let mock = MockBatches::start([tiny]);
     let called = call_with(BLIND, &bench, &mock, "");
-    assert_eq!(called.code, Some(2), "{called:?}");
-    assert!(called.stderr.contains("--image max-side"), "{called:?}");
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 2
+     WARN m: at most 7 tokens may wait for batches; further ones are submitted when others have ended
+    error: http://127.0.0.1:[PORT]/v1: part-1-m-001.jsonl: one request has about 64 tokens, more than may wait for
+        batches of m; send smaller images with --image max-side=N
+    ");
 }
 
 #[test]
@@ -100,8 +104,11 @@ fn a_limit_of_cost_is_kept_at_the_price_of_batches() {
         call_with(BLIND, &bench, &mock, &more)
     };
     let called = limited("0.002");
-    assert_eq!(called.code, Some(3), "{called:?}");
-    assert!(called.stderr.contains("--max-cost"), "{called:?}");
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 3
+     WARN stopped: one more batch could exceed the $0.0020 of --max-cost; the same command with a higher limit
+        continues, and batch cancel frees the requests that wait
+    ");
     assert_eq!(answered(&bench).len(), 2, "{called:?}");
     let called = limited("0.01");
     assert_eq!(called.code, Some(0), "{called:?}");

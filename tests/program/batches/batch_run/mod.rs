@@ -151,8 +151,15 @@ fn open_answers_and_their_marks_go_through_batches_one_after_the_other() {
     let base = mock.base_url();
     let more = "--judge j --levels L0,L4 --out run --batch-run --no-scout --poll 0.02";
     let called = house.call(&model_args(&base, more));
-    assert_eq!(called.code, Some(0), "{called:?}");
-    assert!(called.stdout.contains("75.0"), "{called:?}");
+    insta::assert_snapshot!(called.lines_with("75.0"), @"
+    exit code: 0
+     m       with noise   75.0   75.0 (0.0)   6 of 6   −28.2 +16.1
+     m       with noise   hm3d-v0                 75.0   75.0 (0.0)   −57.6 +22.7
+                          scannet-v0              75.0   75.0 (0.0)   −63.2 +23.5
+                          attribute recognition   75.0   75.0 (0.0)   −63.2 +23.5
+                          object localization     75.0   75.0 (0.0)   −63.2 +23.5
+                          world knowledge         75.0   75.0 (0.0)   −63.2 +23.5
+    ");
     mock.with(|server| {
         let models: Vec<&Value> = server
             .batches

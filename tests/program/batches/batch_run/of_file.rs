@@ -131,11 +131,12 @@ fn a_model_that_cannot_be_asked_stops_alone() {
     });
     let bench = bench_of_two(&mock, ["id = \"typo\"", "id = \"m\""]);
     let called = call(&bench, RUN);
-    assert_eq!(called.code, Some(1), "{called:?}");
-    assert!(
-        called.stdout.contains("! not asked any further"),
-        "{called:?}"
-    );
+    insta::assert_snapshot!(called.lines_with("not asked"), @"
+    exit code: 1
+    ! not asked any further: http://127.0.0.1:[PORT]/v1: typo: http://127.0.0.1:[PORT]/v1 answered 404: no such
+        model (the server knows no model of this name: check --model and --base-url) (replies so far are stored;
+        the same command continues)
+    ");
     let models: BTreeSet<String> = answered(&bench)
         .iter()
         .map(|record| record["model"].as_str().unwrap().to_owned())
@@ -159,8 +160,22 @@ fn a_vendor_that_refuses_batches_stops_its_models_alone() {
     };
     bench.file("models.toml", table("m", &one) + &table("n", &two));
     let called = call(&bench, &format!("{RUN} --no-scout"));
-    assert_eq!(called.code, Some(1), "{called:?}");
-    assert!(called.stdout.contains("this line is no JSON"), "{called:?}");
+    insta::assert_snapshot!(called, @"
+    exit code: 1
+    stdout:
+    2 models · 4 questions · 1 frame · 4 replies, 4 failed · intervals by question
+    ! run: stopped: 4 of 8 trials answered, 4 failed. The same command asks the
+      rest.
+    ! 4 trials of m failed and are not scored.
+    ! Only 4 questions (8 are needed): intervals and tests are rough.
+
+     accuracy in %
+     without images: n 100.0 [51.0, 100.0] · chance 33.3
+    run: run
+    report: run/report.html
+    ! not asked any further: http://127.0.0.1:[PORT]/v1: part-1-m-001.jsonl: the batch batch_1 failed: this line
+        is no JSON (x); none of its requests has a reply
+    ");
     assert_eq!(answered(&bench).len(), QUESTIONS);
     // What cannot be begun is not tried again by the same command.
     assert_eq!(one.count("POST batches"), 1);
