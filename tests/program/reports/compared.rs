@@ -372,7 +372,11 @@ fn a_new_run_is_held_against_a_baseline() {
         "script:m.jsonl is worse than in old at L0, L3-ev, L3-noise, by up to 50.0 points."
     );
     assert_eq!(finding["verdict"], "worse");
-    assert!(worse.stdout.contains("is worse than in old"), "{worse:?}");
+    insta::assert_snapshot!(worse.lines_with("worse"), @"
+    exit code: 0
+     Baseline       −  script:m.jsonl is worse than in old at L0, L3-ev, L3-noise,
+    run: worse
+    ");
     let tex = fs::read_to_string(scene.bench.path("out/tables.tex")).unwrap();
     assert!(tex.contains("New less old"), "{tex}");
     let failing = scene
@@ -402,12 +406,19 @@ fn a_new_run_is_held_against_a_baseline() {
         .call(&words("report old --baseline light --fail-if-worse"));
     assert_eq!(passed_over.code, Some(2), "{passed_over:?}");
     let gap = "script:m.jsonl L3-noise of light is not compared: the new run has no reply about the same images";
-    assert!(passed_over.stderr.contains(gap), "{passed_over:?}");
+    insta::assert_snapshot!(passed_over.messages(), @"
+    exit code: 2
+    error: --fail-if-worse: script:m.jsonl L3-noise of light is not compared: the new run has no reply about the
+        same images; leave the flag out to see the report
+    ");
     let shown = scene.bench.call(&words("report old --baseline light"));
     let printed: Vec<&str> = shown.stdout.split_whitespace().collect();
     assert!(printed.join(" ").contains(gap), "{shown:?}");
     let alone = scene.bench.call(&words("report old --fail-if-worse"));
-    assert!(alone.stderr.contains("--baseline"), "{alone:?}");
+    insta::assert_snapshot!(alone.messages(), @"
+    exit code: 2
+    error: --fail-if-worse: compares with an old run: name it with --baseline OLD
+    ");
 }
 
 #[test]
@@ -426,13 +437,16 @@ fn marks_of_two_judges_are_not_compared() {
     }
     let refused = house.0.call(&words("report one two"));
     assert_eq!(refused.code, Some(2));
-    let said = "two: its answers were marked by script:two.jsonl (upstream) and those of one by script:one.jsonl (upstream)";
-    assert!(refused.stderr.contains(said), "{refused:?}");
+    insta::assert_snapshot!(refused.messages(), @"
+    exit code: 2
+    error: two: its answers were marked by script:two.jsonl (upstream) and those of one by script:one.jsonl
+        (upstream): marks of two judges or protocols cannot be compared; report each run alone, or run openeqa on
+        its folder again with the other's --judge and --protocol: only marks are asked
+    ");
     let baseline = house.0.call(&words("report one --baseline two"));
-    assert!(
-        baseline
-            .stderr
-            .contains("--baseline: compares runs of questions with choices"),
-        "{baseline:?}"
-    );
+    insta::assert_snapshot!(baseline.messages(), @"
+    exit code: 2
+    error: --baseline: compares runs of questions with choices; marks of open questions have no such test: leave
+        it out
+    ");
 }

@@ -8,6 +8,7 @@ use serde_json::Value;
 
 use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::run::{Bench, assert_same_products, files, records, words};
+use crate::support::snapshot::redacted;
 
 /// The flags of every run here: a folder of twelve small frames with maps and without questions.
 const FLAGS: &str = "--model random --blind-model random --levels L0,L2 --data frames";
@@ -35,7 +36,7 @@ fn parts_with_a_plan_are_together_what_one_run_without_is() {
     let bench = with_frames();
     bench.complete(&words(&format!("{FLAGS} --out whole")));
     let said = bench.complete(&words(&format!("plan {FLAGS} --out run")));
-    assert!(said.contains("about 12 frames"), "{said}");
+    insta::assert_snapshot!(redacted(&said), @"run/plan: 41 questions about 12 frames, 164 trials");
     let plan = bench.path("run/plan");
     let file = json(&plan.join("plan.json"));
     assert_eq!(file["schema"], "darkqa.plan/1");
@@ -178,35 +179,30 @@ fn a_frame_that_has_changed_since_the_plan_is_named() {
     bench.complete(&words(&format!("{FLAGS} --out run --shard 1/4")));
     let called = bench.call(&words(&format!("{FLAGS} --out run --shard 4/4")));
     assert_eq!(called.code, Some(2), "{called:?}");
-    let name = frames[11]["frame"].as_str().unwrap();
-    assert!(
-        called.stderr.contains(name) && called.stderr.contains("is not the one that was planned"),
-        "{}",
-        called.stderr
-    );
+    insta::assert_snapshot!(called.messages(), @r#"
+    exit code: 2
+    error: frame "office-0000/robot": its image is not the one that was planned (run/plan); restore it, or write
+        the plan again into another --out
+    "#);
     assert!(!bench.path("run/shard-4-of-4").exists());
     // The plan can be written again only where no part has begun.
     let again = bench.call(&words(&format!("plan {FLAGS} --out run")));
-    assert_eq!(again.code, Some(2), "{again:?}");
-    assert!(
-        again.stderr.contains("parts of another plan"),
-        "{}",
-        again.stderr
-    );
+    insta::assert_snapshot!(again.messages(), @"
+    exit code: 2
+    error: run/plan: the run has parts of another plan, with other questions or frames (run/shard-1-of-4); use
+        another --out, or delete the parts
+    ");
     bench.complete(&words(&format!("plan {FLAGS} --out new")));
     // A file of the plan that was changed is refused.
     let questions = bench.path("new/plan/questions.jsonl");
     let text = fs::read_to_string(&questions).unwrap();
     fs::write(&questions, text.replacen("Which", "What", 1)).unwrap();
     let changed = bench.call(&words(&format!("{FLAGS} --out new")));
-    assert_eq!(changed.code, Some(2), "{changed:?}");
-    assert!(
-        changed
-            .stderr
-            .contains("questions.jsonl: the file is not the one that plan.json"),
-        "{}",
-        changed.stderr
-    );
+    insta::assert_snapshot!(changed.messages(), @"
+    exit code: 2
+    error: new/plan/questions.jsonl: the file is not the one that plan.json was written with; write the plan again
+        with `darkqa-eval plan`
+    ");
 }
 
 #[test]
@@ -220,35 +216,35 @@ fn what_is_missing_is_said_with_the_command_that_asks_it() {
     let refused = merged("");
     assert_eq!(refused.code, Some(2), "{refused:?}");
     let command = format!("darkqa-eval {FLAGS} --out run --shard 4/6");
-    for says in [
-        "1 shard is missing: 4/6 (2 of 12 frames, ",
-        " trials)",
-        &*command,
-    ] {
-        assert!(refused.stderr.contains(says), "{says}: {}", refused.stderr);
-    }
+    insta::assert_snapshot!(refused.messages(), @"
+    exit code: 2
+    error: run/shard-1-of-6: 1 shard is missing: 4/6 (2 of 12 frames, 24 trials); --partial merges the others;
+        darkqa-eval --model random --blind-model random --levels L0,L2 --data frames --out run --shard 4/6 asks
+        what is left
+    ");
     let partial = merged("--partial");
-    assert_eq!(partial.code, Some(1), "{partial:?}");
-    assert!(
-        partial.stderr.contains("4/6 (2 of 12 frames"),
-        "{}",
-        partial.stderr
-    );
+    insta::assert_snapshot!(partial.messages(), @"
+    exit code: 1
+     WARN 1 shard is missing: 4/6 (2 of 12 frames, 24 trials); the summary covers only the others; darkqa-eval
+        --model random --blind-model random --levels L0,L2 --data frames --out run --shard 4/6 asks what is left
+    ");
     // Of two divisions, the one that lacks fewer shards goes on.
     bench.complete(&words(&format!("{FLAGS} --out run --shard 1/2")));
     let mixed = bench.call(&words("merge run --out mixed"));
-    assert!(
-        mixed.stderr.contains("1 shard is missing: "),
-        "{}",
-        mixed.stderr
-    );
+    insta::assert_snapshot!(mixed.messages(), @"
+    exit code: 2
+    error: run/shard-1-of-2: 1 shard is missing: 2/2 (2 of 12 frames, 24 trials); --partial merges the others;
+        darkqa-eval --model random --blind-model random --levels L0,L2 --data frames --out run --shard 2/2 asks
+        what is left
+    ");
     fs::remove_dir_all(bench.path("run/shard-5-of-6")).unwrap();
     let two = bench.call(&words("merge run --out mixed"));
-    assert!(
-        two.stderr.contains("1 shard is missing: 2/2 ("),
-        "{}",
-        two.stderr
-    );
+    insta::assert_snapshot!(two.messages(), @"
+    exit code: 2
+    error: run/shard-1-of-2: 1 shard is missing: 2/2 (5 of 12 frames, 56 trials); --partial merges the others;
+        darkqa-eval --model random --blind-model random --levels L0,L2 --data frames --out run --shard 2/2 asks
+        what is left
+    ");
     // The command said does what it says.
     let words: Vec<&str> = command.split(' ').skip(1).collect();
     bench.complete(&words);

@@ -6,6 +6,7 @@ use std::fs;
 use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::process::{signal, wait_until};
 use crate::support::run::{Bench, assert_same_products, called, model_args, records, words};
+use crate::support::snapshot::redacted;
 use serde_json::Value;
 
 /// The arguments of every evaluation here, and more of them.
@@ -75,22 +76,21 @@ fn a_batch_system_says_which_part_it_is() {
         ("SLURM_ARRAY_TASK_COUNT", "2"),
     ];
     let array = task(&slurm, "--out array");
-    assert_eq!(array.code, Some(0), "{array:?}");
-    assert!(
-        array
-            .stderr
-            .contains("task 2 of a Slurm array of 2: this process does shard 2/2"),
-        "{}",
-        array.stderr
-    );
+    insta::assert_snapshot!(array.messages(), @"
+    exit code: 0
+     WARN task 2 of a Slurm array of 2: this process does shard 2/2; --shard none does everything
+    ");
     assert!(bench.path("array/shard-2-of-2/manifest.json").exists());
     let whole = task(&slurm, "--out all --shard none");
     assert_eq!(whole.code, Some(0), "{whole:?}");
     assert!(bench.path("all/manifest.json").exists());
     let pod = [("JOB_COMPLETION_INDEX", "1")];
     let lost = task(&pod, "--out pod");
-    assert_eq!(lost.code, Some(2));
-    assert!(lost.stderr.contains("--shard auto/N"), "{}", lost.stderr);
+    insta::assert_snapshot!(lost.messages(), @"
+    exit code: 2
+    error: --shard: JOB_COMPLETION_INDEX is the index of this pod, but the number of pods is unknown: set it with
+        --shard auto/N, or do everything in each pod with --shard none
+    ");
     let found = task(&pod, "--out pod --shard auto/3");
     assert_eq!(found.code, Some(0), "{found:?}");
     assert!(bench.path("pod/shard-2-of-3/manifest.json").exists());
@@ -113,12 +113,10 @@ fn missing_double_and_foreign_parts_are_named() {
     refused("parts --out m", "1 shard is missing: 2/3; --partial");
     assert!(!bench.path("m").exists());
     let partial = bench.call(&["merge", "parts", "--out", "m", "--partial"]);
-    assert_eq!(partial.code, Some(1), "{partial:?}");
-    assert!(
-        partial.stdout.contains("! m: incomplete:"),
-        "{}",
-        partial.stdout
-    );
+    insta::assert_snapshot!(partial.lines_with("incomplete"), @"
+    exit code: 1
+    ! m: incomplete: 48 of 48 trials answered, 0 failed.
+    ");
     bench.complete(&args("--out other --shard 2/3 --seed 9"));
     refused("parts other --out n", "is of another run than");
     bench.complete(&args("--out four --shard 2/4"));
@@ -130,11 +128,10 @@ fn missing_double_and_foreign_parts_are_named() {
     refused("whole --out n", "the run is not a shard");
     refused("nowhere --out n", "nowhere");
     let empty = bench.call(&args("--out x --shard 7/7"));
-    assert!(
-        empty.stderr.contains("7/7 is empty: there are 6 frames"),
-        "{}",
-        empty.stderr
-    );
+    insta::assert_snapshot!(empty.messages(), @"
+    exit code: 2
+    error: --shard: 7/7 is empty: there are 6 frames or walks; use at most as many shards
+    ");
 }
 
 /// A mock that gives the same reply to the same request, and the arguments of an evaluation with it.
@@ -158,12 +155,11 @@ fn a_stopped_division_goes_on_with_another_number_of_parts() {
     let locked = fs::File::open(own).unwrap();
     locked.lock().unwrap();
     let refused = bench.call(&words(&format!("{flags} --out parts --shard 1/2")));
-    assert_eq!(refused.code, Some(2), "{refused:?}");
-    assert!(
-        refused.stderr.contains("shard-1-of-3") && refused.stderr.contains("another division"),
-        "{}",
-        refused.stderr
-    );
+    insta::assert_snapshot!(refused.messages(), @"
+    exit code: 2
+    error: parts/shard-1-of-3: another process is writing to this part of another division, and both might ask the
+        same; wait for it, or end it, before --shard 1/2 begins
+    ");
     drop(locked);
     for part in ["1/2", "2/2"] {
         let said = bench.call(&words(&format!("{flags} --out parts --shard {part}")));
@@ -179,12 +175,11 @@ fn a_stopped_division_goes_on_with_another_number_of_parts() {
     assert_same_products(&bench.path("whole"), &bench.path("merged"));
     // A part of another run beside them is refused.
     let other = bench.call(&words(&format!("{flags} --seed 7 --out parts --shard 1/4")));
-    assert_eq!(other.code, Some(2), "{other:?}");
-    assert!(
-        other.stderr.contains("this part is of another run"),
-        "{}",
-        other.stderr
-    );
+    insta::assert_snapshot!(other.messages(), @"
+    exit code: 2
+    error: parts/shard-1-of-3: this part is of another run: its --seed is 0, now it is 7; use another --out, or
+        the same --seed
+    ");
 }
 
 #[test]
@@ -198,8 +193,10 @@ fn replies_that_two_parts_paid_for_are_said() {
     bench.complete(&words(&format!("{flags} --out one --shard 2/2")));
     let merged = bench.call(&words("merge one two --out merged"));
     assert_eq!(merged.code, Some(0), "{merged:?}");
-    let said = "replies differ in two parts: they were paid for twice";
-    assert!(merged.stderr.contains(said), "{}", merged.stderr);
+    insta::assert_snapshot!(merged.messages(), @"
+    exit code: 0
+     WARN 33 replies differ in two parts: they were paid for twice; those of the first part are taken
+    ");
     let first = bench.call(&words("merge one --out first"));
     assert_eq!(first.code, Some(0), "{first:?}");
     assert_same_products(&bench.path("first"), &bench.path("merged"));
@@ -232,10 +229,7 @@ fn limits_and_means_are_shared_by_the_parts() {
     )));
     assert_eq!(of_part.code, Some(0), "{of_part:?}");
     let words_of = of_part.stderr.split("shard 1/2: ").nth(1).unwrap();
-    assert!(
-        words_of.contains("of its $4.00 of --max-cost are left"),
-        "{words_of}"
-    );
+    insta::assert_snapshot!(redacted(&words_of), @"$4.00 of its $4.00 of --max-cost are left; other parts do not get them");
     let text = fs::read(bench.path("paid/shard-1-of-2/manifest.json")).unwrap();
     let manifest: Value = serde_json::from_slice(&text).unwrap();
     let noted = &manifest["settings"]["--max-cost of this part"];

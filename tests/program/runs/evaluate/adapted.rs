@@ -4,6 +4,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::run::{Bench, model_args, records, words};
+use crate::support::snapshot::lines_with;
 use crate::support::table::check_rows;
 use serde_json::{Value, json};
 
@@ -32,7 +33,9 @@ fn a_refused_field_costs_one_request_and_is_said_in_the_report() {
     assert_eq!(mock.requests().len(), 31);
     let noted = json!(["no temperature is sent: the server's own is used"]);
     assert_eq!(manifest(&bench)["settings"]["adapted for m"], noted);
-    assert!(printed.contains("Requests to m were changed"), "{printed}");
+    insta::assert_snapshot!(lines_with(&printed, "Requests"), @"
+    ! Requests to m were changed, because the server refused what was sent first: no
+    ");
     // A run in which nothing was refused says nothing of it.
     let other = Bench::with_questions(3);
     let mock = MockEndpoint::start([Answer::text("C")]);

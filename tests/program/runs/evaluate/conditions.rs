@@ -10,6 +10,7 @@ use super::text;
 use crate::support::frames::png;
 use crate::support::onnx;
 use crate::support::run::{Bench, records, words};
+use crate::support::snapshot::lines_with;
 use crate::support::table::check_rows;
 
 #[test]
@@ -61,10 +62,11 @@ fn every_condition_runs_raw_and_enhanced() {
         "--data frames --model random --llie bright.onnx --llie curve.onnx --llie-anyway --out run",
     );
     let table = bench.complete(&args);
-    assert!(
-        table.contains("with noise + bright") && table.contains("with noise + curve"),
-        "{table}"
-    );
+    insta::assert_snapshot!(lines_with(&table, "with noise"), @"
+    with noise            0.0   33.3   66.7   66.7   33.3   33.3   −45.9 +98.4
+    with noise + bright         33.3   66.7    0.0   33.3   33.3   −65.4 +98.4
+    with noise + curve          33.3   66.7   33.3   66.7   33.3   −65.4 +65.4
+    ");
     let records = records(&bench.path("run"));
     // L0, five of each variant, five for each enhancer on noise.
     assert_eq!(records.len(), 3 * (1 + 5 + 5 + 5 + 5));

@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 use super::text;
 use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::run::{Bench, model_args, records, words};
+use crate::support::snapshot::lines_with;
 use crate::support::table::check_rows;
 
 #[test]
@@ -16,10 +17,9 @@ fn a_record_and_a_row_keep_the_contract() {
     let table = bench.complete(&words(
         "--data frames --model script:script.jsonl --levels L0,L1 --variant ev --out run --full",
     ));
-    assert!(
-        table.contains("(66.7)"),
-        "the lenient parsing differs: {table}"
-    );
+    insta::assert_snapshot!(lines_with(&table, "(66.7)"), @"
+    script:script.jsonl   untouched       33.3 (66.7)          3      2 (0)        0   −27.2 +45.9
+    ");
     let records = records(&bench.path("run"));
     let record = records
         .iter()
