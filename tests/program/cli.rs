@@ -63,7 +63,7 @@ fn refused(bench: &Bench, line: &str, parts: &[&str]) {
 }
 
 #[test]
-fn global_flags_stand_before_or_after_a_command() {
+fn global_flags_work_around_command() {
     let bench = Bench::new();
     bench.complete(&words(
         "--model random --levels L0 --limit 2 --no-parquet --out run",
@@ -78,7 +78,7 @@ fn global_flags_stand_before_or_after_a_command() {
 }
 
 #[test]
-fn flags_of_an_evaluation_before_a_command_are_refused() {
+fn evaluation_flags_before_command_are_refused() {
     let bench = Bench::new();
     refused(
         &bench,
@@ -88,7 +88,7 @@ fn flags_of_an_evaluation_before_a_command_are_refused() {
 }
 
 #[test]
-fn words_for_an_evaluation_lead_to_its_form() {
+fn evaluation_words_show_correct_form() {
     let bench = Bench::new();
     for word in ["run", "evaluate", "eval"] {
         let parts = [word, "leave the word out: darkqa-eval --model NAME"];
@@ -147,7 +147,7 @@ fn wrong_words_name_their_flag() {
 }
 
 #[test]
-fn a_call_without_words_shows_the_first_steps() {
+fn call_without_words_shows_first_steps() {
     let called = Bench::new().call(&[]);
     insta::assert_snapshot!(called.messages(), @"
     exit code: 2
@@ -162,7 +162,7 @@ fn a_call_without_words_shows_the_first_steps() {
 }
 
 #[test]
-fn completions_and_manual_come_from_the_flags() {
+fn completions_and_manual_come_from_flags() {
     let bench = Bench::new();
     check_rows(["bash", "zsh", "fish", "powershell", "elvish"], |shell| {
         let script = bench.complete(&["completions", shell]);
@@ -177,7 +177,7 @@ fn completions_and_manual_come_from_the_flags() {
 }
 
 #[test]
-fn an_estimate_names_the_models_that_need_no_endpoint() {
+fn estimate_names_built_in_models() {
     let bench = Bench::new();
     let said = bench.complete(&words(
         "--model observer --blind-model random --data rooms:frames=3,size=96x64 --levels L0,L3 --dry-run",
@@ -214,7 +214,7 @@ fn a_dry_run_needs_no_key() {
 
 /// Retries take a minute by default, so the first failure is said at once, and once.
 #[test]
-fn an_address_without_a_server_is_said_at_the_first_try() {
+fn unreachable_address_is_reported_at_once() {
     let bench = Bench::with_questions(3);
     let line = "--data set.jsonl --model m --base-url http://127.0.0.1:9/v1 --levels L0 --retries 1 --out run";
     let called = bench.call(&words(line));
@@ -229,7 +229,7 @@ fn an_address_without_a_server_is_said_at_the_first_try() {
 
 /// A server that turns requests away is waited for, half an hour by default: the user learns why nothing happens.
 #[test]
-fn a_server_that_takes_nothing_is_said_while_the_run_waits() {
+fn refusing_server_is_reported_while_waiting() {
     let away = || Answer::error(429, "x", "slow down").header("retry-after", "0.1");
     let mut answers: Vec<Answer> = (0..8).map(|_| away()).collect();
     answers.push(Answer::text("A"));
@@ -374,7 +374,7 @@ fn values(summary: &str, name: &str) -> BTreeSet<String> {
 }
 
 #[test]
-fn a_switch_turned_off_above_beats_one_turned_on_below() {
+fn higher_layer_overrides_switch() {
     let rows = [
         ("--config c.toml", "false", "\"image\""),
         ("--config c.toml", "", "\"blind\""),
@@ -395,7 +395,7 @@ fn a_switch_turned_off_above_beats_one_turned_on_below() {
 }
 
 #[test]
-fn the_variables_of_others_are_defaults_below_the_file() {
+fn foreign_variables_rank_below_file() {
     let bench = Bench::new();
     bench.file("c.toml", "base-url = \"http://of-the-file.test/v1\"\n");
     let error = |line: &str, ours: &str| {
@@ -415,7 +415,7 @@ fn the_variables_of_others_are_defaults_below_the_file() {
 }
 
 #[test]
-fn a_file_of_flags_has_lists_and_names_its_mistakes() {
+fn flag_file_has_lists_and_errors() {
     let bench = Bench::new();
     bench.file(
         "lists.toml",
@@ -444,7 +444,7 @@ fn a_file_of_flags_has_lists_and_names_its_mistakes() {
 }
 
 #[test]
-fn a_variable_that_sets_nothing_is_refused() {
+fn variable_that_sets_nothing_is_refused() {
     let bench = Bench::new();
     let run = called(bench.command(&words(SHORT)).env("DARKQA_LEVEL", "L0"));
     assert_eq!(run.code, Some(2), "{run:?}");
@@ -467,7 +467,7 @@ fn a_cause_is_said_once() {
 }
 
 #[test]
-fn quiet_prints_where_things_were_written_alone() {
+fn quiet_prints_only_output_paths() {
     let bench = Bench::with_questions(12);
     let line = "--model random --data set.jsonl --levels L0,L5 --out run --quiet";
     assert_eq!(bench.complete(&words(line)), "run\n");

@@ -56,7 +56,7 @@ fn expired(request: &Value) -> String {
 }
 
 #[test]
-fn what_is_left_goes_out_in_files_and_comes_back_in_any_order() {
+fn exported_batches_return_in_any_order() {
     let bench = Bench::with_questions(QUESTIONS);
     let message = export(&bench, "--file-requests 5");
     // L0, L3 in both variants, and blind: 4 conditions of 4 questions.
@@ -177,7 +177,7 @@ fn broken_files_are_named() {
 
 /// Lines of each API, and probabilities in them, are what single requests are.
 #[test]
-fn probabilities_and_responses_come_through_a_batch() {
+fn probabilities_and_responses_come_through_batch() {
     let bench = Bench::with_questions(QUESTIONS);
     export(&bench, "--probabilities --wire responses");
     let requests = requests(&bench);
@@ -218,7 +218,7 @@ fn probabilities_and_responses_come_through_a_batch() {
 
 /// What is known of a vendor's lines: Azure has a path of its own for chat completions.
 #[test]
-fn the_path_in_a_line_is_that_of_the_vendor() {
+fn batch_line_uses_vendor_path() {
     for (more, url) in [
         ("", "/chat/completions"),
         ("--wire responses", "/v1/responses"),

@@ -216,7 +216,7 @@ fn habitat_renders_of_matterport_and_replica() {
 }
 
 #[test]
-fn what_is_wrong_with_renders_is_said() {
+fn faulty_renders_are_named() {
     let scene = habitat();
     fs::remove_file(scene.at("00800-x/x.semantic.txt")).unwrap();
     insta::assert_snapshot!(redacted(&scene.refused("habitat", &[])), @"
@@ -515,7 +515,7 @@ fn folders_of_images_and_maps() {
 }
 
 #[test]
-fn class_maps_of_arrays_are_read_and_other_files_are_named() {
+fn array_class_maps_are_read() {
     let scene = Scene::new();
     for number in 0..3 {
         scene.rgb(&format!("home/rgb/{number}.png"));
@@ -558,7 +558,7 @@ fn class_maps_of_arrays_are_read_and_other_files_are_named() {
 }
 
 #[test]
-fn hypersim_is_read_with_its_maps_in_hdf5() {
+fn hypersim_maps_in_hdf5_are_read() {
     let scene = Scene::new();
     let images = "ai_001_002/images/scene_cam_01";
     scene.rgb("image.png");
@@ -664,7 +664,7 @@ fn hdf5(class: u8, bits: u8, size: [u64; 2], data: &[u8]) -> Vec<u8> {
 }
 
 #[test]
-fn a_folder_without_class_maps_says_so() {
+fn folder_without_class_maps_says_so() {
     let scene = Scene::new();
     scene.rgb("rgb/0.png");
     let called = scene.run("folder", &["--labels", "nyu40"]).ended(0);
@@ -677,7 +677,7 @@ fn a_folder_without_class_maps_says_so() {
 }
 
 #[test]
-fn folders_are_joined_and_scenes_of_one_name_told_apart() {
+fn folders_join_with_distinct_scenes() {
     let scene = Scene::new();
     for (folder, class) in [("one", 4), ("two", 5)] {
         scene.rgb(&format!("{folder}/home/rgb/0.png"));

@@ -120,7 +120,7 @@ fn number(row: &Value, field: &str) -> f64 {
 }
 
 #[test]
-fn a_photograph_is_a_condition_of_its_own_beside_synthetic_ones() {
+fn photographs_are_a_separate_condition() {
     let bench = with_photographs(|number| darker(&scene(number), 3.6), DARK);
     script(
         &bench,
@@ -219,7 +219,7 @@ fn a_photograph_is_a_condition_of_its_own_beside_synthetic_ones() {
 }
 
 #[test]
-fn the_bytes_of_a_photograph_are_sent_as_they_lie() {
+fn photograph_bytes_are_sent_unchanged() {
     let bench = with_photographs(|number| darker(&scene(number), 3.0), DARK);
     let endpoint = MockEndpoint::start([Answer::text("C")]);
     let base = endpoint.base_url();
@@ -288,7 +288,7 @@ fn shards_merge_into_the_same_products() {
 }
 
 #[test]
-fn match_is_as_dark_as_the_photograph_of_each_frame() {
+fn match_uses_brightness_of_each_photograph() {
     let ev = |number| 2.0 + 0.25 * f64::from(number);
     let bench = with_photographs(|number| darker(&scene(number), ev(number)), DARK);
     script(&bench, &[("dark", 6), ("match-ev", 6), ("match-noise", 9)]);
@@ -339,7 +339,7 @@ fn match_is_as_dark_as_the_photograph_of_each_frame() {
 }
 
 #[test]
-fn the_same_image_is_no_darker_and_gives_no_difference() {
+fn same_image_shows_no_difference() {
     let bench = with_photographs(scene, DARK);
     script(&bench, &[]);
     let called = bench.call(&words(
@@ -414,7 +414,7 @@ fn odd_pairs_are_told() {
 }
 
 #[test]
-fn pairs_in_two_folders_are_frames_named_by_their_files() {
+fn two_folders_pair_by_file_name() {
     let bench = Bench::new();
     for folder in ["normal", "low"] {
         fs::create_dir_all(bench.path(folder)).unwrap();
@@ -465,7 +465,7 @@ fn pairs_in_two_folders_are_frames_named_by_their_files() {
 }
 
 #[test]
-fn a_set_in_the_dark_is_asked_as_photographed_and_enhanced() {
+fn dark_set_is_asked_with_enhancement() {
     let bench = Bench::new();
     fs::create_dir_all(bench.path("set")).unwrap();
     for number in 0..SCENES {

@@ -24,7 +24,7 @@ fn bench() -> Bench {
 }
 
 #[test]
-fn a_set_with_two_readings_is_asked_as_the_user_says() {
+fn ambiguous_answers_need_a_mapping() {
     let bench = bench();
     let run = |line: &str| {
         bench.call(&words(&format!(
@@ -71,7 +71,7 @@ fn a_set_with_two_readings_is_asked_as_the_user_says() {
 }
 
 #[test]
-fn paths_that_lead_out_are_allowed_by_name_alone() {
+fn outside_paths_need_data_root() {
     let bench = bench();
     fs::create_dir(bench.path("set")).unwrap();
     let line = json!({"id": 1, "image": "../a.png", "question": "?", "choices": ["x", "y"], "answer": "x"});
@@ -111,7 +111,7 @@ fn paths_that_lead_out_are_allowed_by_name_alone() {
 
 #[cfg(unix)]
 #[test]
-fn links_that_lead_out_of_a_folder_of_images_are_named_and_not_sent() {
+fn outside_links_are_named_and_skipped() {
     let bench = bench();
     fs::create_dir(bench.path("images")).unwrap();
     fs::copy(bench.path("a.png"), bench.path("images/own.png")).unwrap();
@@ -134,7 +134,7 @@ fn links_that_lead_out_of_a_folder_of_images_are_named_and_not_sent() {
 }
 
 #[test]
-fn a_check_names_everything_that_is_wrong() {
+fn check_names_everything_that_is_wrong() {
     let bench = bench();
     let line = "check --data set.json --map answer=answer:index1 --open skip";
     let called = bench.call(&words(line));
@@ -179,7 +179,7 @@ fn a_check_names_everything_that_is_wrong() {
 }
 
 #[test]
-fn the_template_can_be_checked_and_run_as_it_is() {
+fn template_checks_and_runs_unchanged() {
     let bench = Bench::new();
     let made = bench.complete(&words("init my-data"));
     for line in made
@@ -263,7 +263,7 @@ fn the_template_can_be_checked_and_run_as_it_is() {
 }
 
 #[test]
-fn the_table_that_is_not_read_is_named() {
+fn unread_table_is_named() {
     let bench = Bench::new();
     bench.complete(&words("init my-data"));
     fs::create_dir(bench.path("empty")).unwrap();
@@ -287,7 +287,7 @@ fn the_table_that_is_not_read_is_named() {
 }
 
 #[test]
-fn a_folder_whose_images_are_in_folders_names_its_file_of_questions() {
+fn nested_images_need_question_file() {
     let bench = Bench::new();
     bench.complete(&words("init flat"));
     fs::create_dir_all(bench.path("data/images")).unwrap();
@@ -321,7 +321,7 @@ fn a_folder_whose_images_are_in_folders_names_its_file_of_questions() {
 }
 
 #[test]
-fn an_answer_that_is_no_text_of_a_choice_is_named_in_the_own_form() {
+fn answer_outside_options_is_refused() {
     let bench = Bench::new();
     bench.complete(&words("init data"));
     fs::remove_file(bench.path("data/questions.csv")).unwrap();
@@ -366,7 +366,7 @@ fn line_of(table: &str, starts: &str) -> Vec<String> {
 }
 
 #[test]
-fn a_set_with_groups_has_its_strict_score() {
+fn grouped_set_has_strict_score() {
     let bench = pairs();
     let line = "--data set.json --model random --blind-model random --levels L0,L3";
     bench.complete(&words(&format!("{line} --out plain")));
@@ -450,7 +450,7 @@ fn a_set_with_groups_has_its_strict_score() {
 }
 
 #[test]
-fn drawn_questions_break_groups_and_the_report_says_so() {
+fn report_counts_incomplete_groups() {
     let bench = pairs();
     let line = "--data set.json --model random --levels L0 --map group=pair";
     bench.complete(&words(&format!("{line} --limit 5 --out run")));
@@ -535,7 +535,7 @@ fn transparent() -> Vec<u8> {
 }
 
 #[test]
-fn an_image_that_cannot_be_used_is_left_out_and_counted() {
+fn unusable_image_is_skipped_and_counted() {
     for bytes in [
         None,
         Some(Vec::new()),
@@ -572,7 +572,7 @@ fn an_image_that_cannot_be_used_is_left_out_and_counted() {
 }
 
 #[test]
-fn the_limit_on_unusable_images_is_shared_with_missing_ones_and_can_be_raised() {
+fn unusable_and_missing_share_limit() {
     let bench = with_unusable(&[(3, None), (7, Some(transparent()))]);
     let run = |line: &str| {
         bench.call(&words(&format!(
@@ -597,7 +597,7 @@ fn the_limit_on_unusable_images_is_shared_with_missing_ones_and_can_be_raised() 
 }
 
 #[test]
-fn unusable_photographs_are_left_out_of_a_bank() {
+fn question_bank_skips_unusable_photographs() {
     let bench = with_unusable(&[(7, Some(b"no image".to_vec()))]);
     let bank = json!({"id": "a", "question": "Which?", "choices": ["x \n", "y"]});
     bench.file("bank.jsonl", bank.to_string());
@@ -618,7 +618,7 @@ fn unusable_photographs_are_left_out_of_a_bank() {
 }
 
 #[test]
-fn a_changed_image_is_named_when_a_run_goes_on() {
+fn changed_image_stops_continued_run() {
     let bench = with_unusable(&[]);
     let run = || {
         bench.call(&words(

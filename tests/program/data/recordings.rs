@@ -67,7 +67,7 @@ fn topics_are_listed_without_a_folder() {
 }
 
 #[test]
-fn frames_have_their_pixels_times_cameras_and_exposures() {
+fn frames_keep_pixels_times_and_cameras() {
     for compression in Compression::ALL {
         let bench = with_recording(drive(4, compression));
         let called = import(&bench, "--topic /front/image_raw --every 0 --out out").ended(0);
@@ -146,7 +146,7 @@ fn stretches_are_scenes_whatever_is_taken() {
 }
 
 #[test]
-fn frames_that_did_not_change_are_left_out() {
+fn unchanged_frames_are_skipped() {
     let mut records = Records::default();
     records.topic(1, "/c", "sensor_msgs/msg/Image", "cdr", "");
     for (i, shade) in [10, 12, 60, 61, 13].into_iter().enumerate() {
@@ -212,7 +212,7 @@ fn a_damaged_chunk_is_left_out() {
 }
 
 #[test]
-fn time_that_goes_back_starts_a_scene_and_is_reported() {
+fn time_reversal_starts_new_scene() {
     let mut records = Records::default();
     records.topic(1, "/c", "sensor_msgs/msg/Image", "cdr", "");
     for at in [100.0, 101.0, 102.0, 5.0, 6.0, 7.0] {
@@ -236,7 +236,7 @@ fn time_that_goes_back_starts_a_scene_and_is_reported() {
 }
 
 #[test]
-fn topics_with_other_clocks_are_sampled_alike() {
+fn topics_with_other_clocks_sample_alike() {
     let mut records = Records::default();
     records.topic(1, "/front", "sensor_msgs/msg/Image", "cdr", "");
     records.topic(2, "/rear", "sensor_msgs/msg/Image", "cdr", "");
@@ -257,7 +257,7 @@ fn topics_with_other_clocks_are_sampled_alike() {
 }
 
 #[test]
-fn a_topic_without_messages_keeps_the_frames_of_others() {
+fn empty_topic_keeps_other_frames() {
     let bench = with_recording(drive(4, Compression::None));
     let called = import(&bench, "--topic /front/image_raw --topic /middle --out out").ended(1);
     insta::assert_snapshot!(called.messages(), @"
@@ -268,7 +268,7 @@ fn a_topic_without_messages_keeps_the_frames_of_others() {
 }
 
 #[test]
-fn long_texts_of_a_recording_are_cut() {
+fn long_texts_of_recording_are_cut() {
     let mut records = Records::default();
     records.topic(1, "/c", "sensor_msgs/msg/CompressedImage", "cdr", "");
     records.message(1, 0.0, &compressed(0.0, &"x\n".repeat(40_000), b"x"));
@@ -280,7 +280,7 @@ fn long_texts_of_a_recording_are_cut() {
 }
 
 #[test]
-fn mosaics_and_depth_in_image_files_are_refused() {
+fn mosaic_and_depth_files_are_refused() {
     let mut png = std::io::Cursor::new(Vec::new());
     picture(0, SIZE)
         .write_to(&mut png, image::ImageFormat::Png)
@@ -302,7 +302,7 @@ fn mosaics_and_depth_in_image_files_are_refused() {
 }
 
 #[test]
-fn images_that_cannot_be_read_are_named() {
+fn unreadable_images_are_named() {
     let mut records = Records::default();
     records.topic(1, "/good", "sensor_msgs/msg/Image", "cdr", "");
     records.topic(2, "/odd", "sensor_msgs/msg/Image", "cdr", "");
@@ -354,7 +354,7 @@ fn images_that_cannot_be_read_are_named() {
 }
 
 #[test]
-fn codes_of_sixteen_bits_are_kept_and_scaled() {
+fn sixteen_bit_codes_are_scaled() {
     let mut records = Records::default();
     records.topic(1, "/c", "sensor_msgs/msg/Image", "cdr", "");
     let codes: Vec<u8> = [0_u16, 1000, 4095, 2000]
@@ -381,7 +381,7 @@ fn codes_of_sixteen_bits_are_kept_and_scaled() {
 }
 
 #[test]
-fn other_files_are_named_for_what_they_are() {
+fn unrelated_files_are_identified() {
     for (bytes, expected) in [
         (&b"#ROSBAG V2.0\n"[..], "import rosbag"),
         (b"SQLite format 3\0", "rosbags-convert"),
@@ -406,7 +406,7 @@ fn other_files_are_named_for_what_they_are() {
 }
 
 #[test]
-fn a_bag_folder_is_read_in_the_order_of_its_files() {
+fn bag_folder_keeps_file_order() {
     let bench = Bench::new();
     for (number, at) in [(0, 0.0), (2, 60.0), (10, 90.0)] {
         let mut records = Records::default();
@@ -425,7 +425,7 @@ fn a_bag_folder_is_read_in_the_order_of_its_files() {
 }
 
 #[test]
-fn a_broken_file_of_a_bag_keeps_the_others() {
+fn broken_file_of_bag_keeps_others() {
     let bench = Bench::new();
     let mut records = Records::default();
     records.topic(1, "/c", "sensor_msgs/msg/Image", "cdr", "");
@@ -449,7 +449,7 @@ fn a_broken_file_of_a_bag_keeps_the_others() {
 }
 
 #[test]
-fn a_bag_of_ros_1_gets_its_conversion() {
+fn ros_1_bag_names_its_conversion() {
     let bench = Bench::new();
     bench.file("my drive.bag", b"#ROSBAG V2.0\n");
     let called = bench.call(&["import", "rosbag", "my drive.bag"]).ended(2);
@@ -498,7 +498,7 @@ fn import_video(bench: &Bench, line: &str, path: &Path) -> Called {
 
 #[cfg(unix)]
 #[test]
-fn frames_of_a_video_come_from_ffmpeg() {
+fn frames_of_video_come_from_ffmpeg() {
     let bench = Bench::new();
     bench.file("drive.mp4", b"x");
     with_ffmpeg(&bench, "exit 0");

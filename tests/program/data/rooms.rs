@@ -294,7 +294,7 @@ fn pixels(rooms: Rooms, place: usize) -> Digest {
 }
 
 #[test]
-fn a_seed_gives_the_same_bytes_everywhere() {
+fn seed_gives_same_bytes_everywhere() {
     let rooms = Rooms {
         frames: 12,
         seed: 7,
@@ -328,7 +328,7 @@ fn a_seed_gives_the_same_bytes_everywhere() {
 const PINNED: &str = "c5491c84daf164e02b0e216ece0341d6587fc9a1a7dbd2b87cb27afdda41968b";
 
 #[test]
-fn rooms_on_disk_are_those_in_the_program() {
+fn stored_rooms_match_built_in() {
     let bench = Bench::new();
     let size = ["--frames", "4", "--size", "160x120"];
     bench.complete(&[&["rooms", "--out", "frames"][..], &size].concat());
@@ -385,7 +385,7 @@ fn rooms_on_disk_are_those_in_the_program() {
 }
 
 #[test]
-fn settings_that_make_no_sense_are_named() {
+fn senseless_settings_are_named() {
     let bench = Bench::new();
     let rows = [
         ("rooms:frames=0", "frames=0"),

@@ -37,7 +37,7 @@ fn bench() -> Bench {
 const RUN: &str = "--model random --data set --levels L0,L3 --variant ev --out run";
 
 #[test]
-fn scenes_are_clusters_and_can_be_named_later() {
+fn scenes_cluster_and_are_named_later() {
     let bench = bench();
     questions(&bench, false);
     let suggested = "File names suggest 12 scenes (scene0000, scene0001, …), but the data name none, so the 24 frames count as independent";

@@ -82,7 +82,7 @@ fn number(row: &Value, column: &str) -> f64 {
 
 /// The photographs in the dark would be left aside without a word.
 #[test]
-fn pairs_are_not_asked_without_true_answers() {
+fn pairs_need_true_answers() {
     let bench = photographs();
     for (folder, name) in [("light", "a.png"), ("dark", "a.png")] {
         fs::create_dir_all(bench.path(folder)).unwrap();
@@ -106,7 +106,7 @@ fn pairs_are_not_asked_without_true_answers() {
 }
 
 #[test]
-fn a_folder_of_photographs_is_asked_and_no_reply_is_right_or_wrong() {
+fn photographs_have_no_true_answers() {
     let bench = photographs();
     let called = bench.call(&words(ASKED));
     insta::assert_snapshot!(called.messages(), @r#"
@@ -141,7 +141,7 @@ fn a_folder_of_photographs_is_asked_and_no_reply_is_right_or_wrong() {
 }
 
 #[test]
-fn the_report_says_how_far_the_answers_are_those_in_the_light() {
+fn report_measures_agreement_with_l0() {
     let bench = photographs();
     let shown = bench.complete(&words(ASKED));
     let own = rows(&bench, "run/own_answers.csv");
@@ -206,7 +206,7 @@ fn the_report_says_how_far_the_answers_are_those_in_the_light() {
 }
 
 #[test]
-fn the_word_accuracy_stands_over_no_agreement() {
+fn word_accuracy_stands_over_no_agreement() {
     let bench = photographs();
     let shown = bench.complete(&words(ASKED)) + &bench.complete(&["report", "run", "--full"]);
     assert!(!shown.contains("ccuracy"), "{shown}");
@@ -243,7 +243,7 @@ fn the_word_accuracy_stands_over_no_agreement() {
 }
 
 #[test]
-fn a_bank_to_which_all_is_no_gives_no_verdict() {
+fn constant_no_gives_no_verdict() {
     let bench = photographs();
     bench.file("no.jsonl", json!({"default": "B"}).to_string());
     let shown = bench.complete(&words(&ASKED.replace("eyes.jsonl", "no.jsonl")));
@@ -260,7 +260,7 @@ fn a_bank_to_which_all_is_no_gives_no_verdict() {
 }
 
 #[test]
-fn a_model_that_cannot_be_read_in_the_light_is_held_against_nothing() {
+fn unreadable_model_is_not_compared() {
     let bench = photographs();
     bench.file("mute.jsonl", json!({"default": "Well."}).to_string());
     let shown = bench.complete(&words(&ASKED.replace("eyes.jsonl", "mute.jsonl")));
@@ -279,7 +279,7 @@ fn a_model_that_cannot_be_read_in_the_light_is_held_against_nothing() {
 }
 
 #[test]
-fn a_way_out_is_a_measure_of_its_own() {
+fn cannot_tell_has_its_own_measure() {
     let bench = photographs();
     let bank = text(&bench, "bank.jsonl").replace("\"no\"]", "\"no\",\"Cannot tell\"]");
     bench.file("bank.jsonl", bank);
@@ -307,7 +307,7 @@ fn a_way_out_is_a_measure_of_its_own() {
 }
 
 #[test]
-fn runs_go_on_grow_and_are_merged() {
+fn runs_continue_grow_and_merge() {
     let bench = photographs();
     let less = ASKED.replace("--levels L0,L1,L5", "--levels L0,L5");
     bench.complete(&words(&less));
@@ -340,7 +340,7 @@ fn runs_go_on_grow_and_are_merged() {
 }
 
 #[test]
-fn fewer_questions_a_photograph_grow_to_more() {
+fn fewer_questions_photograph_grow_to_more() {
     let bench = photographs();
     let few = format!("{ASKED} --ask-per-image 1");
     bench.complete(&words(&few));
@@ -350,7 +350,7 @@ fn fewer_questions_a_photograph_grow_to_more() {
 }
 
 #[test]
-fn two_models_are_held_against_each_other() {
+fn two_models_are_compared_by_agreement() {
     let bench = photographs();
     let shown = bench.complete(&words(&format!("{ASKED} --model random")));
     // References are not compared with models.
@@ -404,7 +404,7 @@ fn what_needs_a_truth_is_refused() {
 }
 
 #[test]
-fn images_of_rooms_and_of_sets_are_asked_too() {
+fn rooms_and_sets_work_without_labels() {
     let bench = photographs();
     let set = json!({"id": "a", "image": "photos/hall/00.png", "question": "?", "choices": ["yes", "no"], "answer": "no"});
     bench.file("set.jsonl", set.to_string());
@@ -446,7 +446,7 @@ fn photographs_in_the_dark() -> Bench {
 const NOTICE: &str = "These photographs were taken in the dark (--light dark): L0 is each as photographed, there is no image in the light";
 
 #[test]
-fn photographs_in_the_dark_are_asked_as_they_are() {
+fn dark_photographs_are_asked_unchanged() {
     let bench = photographs_in_the_dark();
     let line = "--data photos --ask bank.jsonl --model random --out run";
     let called = bench.call(&words(&format!("{line} --light dark")));
@@ -531,7 +531,7 @@ fn photographs_in_the_dark_are_asked_as_they_are() {
 }
 
 #[test]
-fn an_enhancer_of_photographs_in_the_dark_does_no_harm_in_the_light() {
+fn enhancing_bright_photographs_is_reported_harmful() {
     let bench = photographs_in_the_dark();
     let replies = text(&bench, "eyes.jsonl");
     let enhanced: String = replies

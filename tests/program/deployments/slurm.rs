@@ -61,7 +61,7 @@ fn array(bench: &Bench, tasks: usize, args: &[&str]) -> Command {
 
 #[test]
 #[ignore = "needs a Slurm that runs on this machine alone, and takes a minute"]
-fn killed_tasks_go_on_in_another_number_of_parts() {
+fn killed_tasks_resume_in_other_shards() {
     if !succeeds("sinfo", &[]) {
         skip("no Slurm answers");
         return;

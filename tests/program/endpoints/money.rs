@@ -26,7 +26,7 @@ fn args<'a>(base: &'a str, more: &'a str) -> Vec<&'a str> {
 }
 
 #[test]
-fn a_dry_run_sends_nothing_and_leaves_nothing() {
+fn dry_run_sends_and_writes_nothing() {
     let bench = Bench::with_questions(3);
     let mock = MockEndpoint::start([Answer::text("C")]);
     let base = mock.base_url();
@@ -70,7 +70,7 @@ fn a_dry_run_sends_nothing_and_leaves_nothing() {
 }
 
 #[test]
-fn a_run_stops_before_it_costs_too_much_and_goes_on_with_more() {
+fn budget_stops_run_until_raised() {
     let bench = Bench::with_questions(12);
     bench.file("prices.toml", PRICES);
     // 90 tokens of prompt and 1 of reply: 9 cents each.
@@ -120,7 +120,7 @@ fn a_limit_needs_a_price() {
 }
 
 #[test]
-fn an_image_beyond_the_limit_is_found_before_anything_is_asked() {
+fn oversized_image_is_found_early() {
     let bench = Bench::with_questions(2);
     let mock = MockEndpoint::start([Answer::text("C")]);
     let base = mock.base_url();
@@ -134,7 +134,7 @@ fn an_image_beyond_the_limit_is_found_before_anything_is_asked() {
 }
 
 #[test]
-fn the_estimate_is_corrected_by_what_prompts_are_charged() {
+fn charged_prompts_correct_estimate() {
     let bench = Bench::with_questions(20);
     bench.file("prices.toml", PRICES);
     let mock = MockEndpoint::start([Answer::message_charged("C", 900)]);
@@ -233,7 +233,7 @@ fn limited(
 
 /// What a server may charge for without a word, with short and long replies in any order.
 #[test]
-fn a_limit_holds_whatever_is_charged_for() {
+fn limit_holds_whatever_is_charged_for() {
     type Answers = fn(u64) -> (Answer, u64);
     let rows: [(&str, Answers, f64); 9] = [
         (
@@ -384,7 +384,7 @@ fn replies_beyond_their_limit_are_said() {
 
 /// Without a token limit the cost has no bound, which is said before anything is sent.
 #[test]
-fn a_limit_without_a_token_limit_is_no_bound() {
+fn cost_limit_needs_token_limit() {
     for more in [
         "--token-field none",
         "--extra-body {\"google\":{\"thinking_config\":{\"thinking_budget\":-1}}}",
@@ -451,7 +451,7 @@ fn billed(usage: &Value) -> Answer {
 }
 
 #[test]
-fn the_bill_is_that_of_the_vendors() {
+fn bill_is_that_of_vendors() {
     // By hand, in dollars: the tokens of the prompt by 1,000 and those of the reply by 100.
     let vendors = [
         // OpenAI: reasoning within the reply.
@@ -516,7 +516,7 @@ fn the_bill_is_that_of_the_vendors() {
 }
 
 #[test]
-fn the_cost_of_attempts_without_a_reply_is_in_the_report() {
+fn report_counts_cost_of_failures() {
     let bench = Bench::with_questions(1);
     let usage = json!({"prompt_tokens": 1000, "completion_tokens": 100});
     let empty = Answer::json(200, &json!({"model": "m", "choices": [], "usage": usage}));
@@ -531,7 +531,7 @@ fn the_cost_of_attempts_without_a_reply_is_in_the_report() {
 }
 
 #[test]
-fn the_report_has_the_prices_that_the_run_had() {
+fn report_has_prices_that_run_had() {
     let bench = Bench::with_questions(1);
     let usage = json!({"prompt_tokens": 1000, "completion_tokens": 100});
     let mock = MockEndpoint::start([billed(&usage)]);

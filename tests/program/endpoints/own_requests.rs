@@ -42,7 +42,7 @@ fn refusal(url: &str, line: &[&str], variables: &[(&str, &str)]) -> String {
 }
 
 #[test]
-fn a_key_goes_to_its_own_vendor_alone() {
+fn key_goes_only_to_vendor() {
     const ANTHROPIC: &str = "https://api.anthropic.com/v1";
     let openai = [("OPENAI_API_KEY", "sk-openai-0123456789")];
     let error = refusal(ANTHROPIC, &[], &openai);
@@ -69,7 +69,7 @@ fn a_key_goes_to_its_own_vendor_alone() {
 }
 
 #[test]
-fn a_key_in_place_of_a_name_is_refused_and_not_shown() {
+fn key_given_as_name_is_hidden() {
     for key in [
         "sk-proj-0123",
         "AIzaSyAbc",
@@ -88,7 +88,7 @@ fn a_key_in_place_of_a_name_is_refused_and_not_shown() {
 }
 
 #[test]
-fn headers_are_sent_and_their_secrets_are_nowhere() {
+fn headers_are_sent_and_secrets_hidden() {
     let bench = Bench::with_questions(1);
     let echo = Answer::error(400, "bad", &format!("{SECRET} may not do that"));
     let mock = MockEndpoint::start([echo, Answer::text(&format!("A {SECRET}"))]);
@@ -118,7 +118,7 @@ fn headers_are_sent_and_their_secrets_are_nowhere() {
 }
 
 #[test]
-fn a_secret_header_is_not_sent_unencrypted_or_twice() {
+fn secret_header_needs_https() {
     let variables = [("GATEWAY", SECRET), ("OPENAI_API_KEY", "sk-0123456789")];
     let url = "http://h.example/v1";
     let error = refusal(url, &["--header-env", "X-Auth=GATEWAY"], &variables[..1]);
@@ -141,7 +141,7 @@ fn a_secret_header_is_not_sent_unencrypted_or_twice() {
 }
 
 #[test]
-fn the_body_is_merged_and_fields_are_left_out() {
+fn extra_body_merges_and_drops_fields() {
     let body = r#"{"chat_template_kwargs": {"enable_thinking": false}, "stop": ["\"url\":\"\""], "max": {"a": {}}}"#;
     let line = [
         "--extra-body",
@@ -191,7 +191,7 @@ fn the_body_is_merged_and_fields_are_left_out() {
 }
 
 #[test]
-fn what_the_program_sets_is_refused_by_name() {
+fn program_fields_are_refused_by_name() {
     let url = "http://127.0.0.1:9/v1";
     let error = refusal(url, &["--extra-body", r#"{"temperature": 1}"#], &[]);
     insta::assert_snapshot!(redacted(&error), @"error: --extra-body: temperature is set by the program: use --temperature");
@@ -212,7 +212,7 @@ fn what_the_program_sets_is_refused_by_name() {
 
 /// Bodies are written to the manifest and to files of batches.
 #[test]
-fn a_secret_in_the_body_is_refused_and_written_nowhere() {
+fn secret_in_body_is_refused() {
     let bench = Bench::with_questions(1);
     let mock = MockEndpoint::start([Answer::text("C")]);
     let body = format!("{{\"litellm\": {{\"api_key\": \"{SECRET}\"}}}}");
@@ -241,7 +241,7 @@ fn a_secret_in_the_body_is_refused_and_written_nowhere() {
 }
 
 #[test]
-fn a_refused_field_of_the_user_is_named() {
+fn refused_field_of_user_is_named() {
     let bench = Bench::with_questions(1);
     let refused = json!({"error": {"message": "unknown parameter", "param": "top_k", "code": "unknown_parameter"}});
     let mock = MockEndpoint::start([Answer::json(400, &refused)]);
@@ -258,7 +258,7 @@ fn a_refused_field_of_the_user_is_named() {
 
 /// Keys of trials of the version before the fields of the user: where none of them is set, they are the same.
 #[test]
-fn keys_of_runs_without_own_fields_stay() {
+fn trial_keys_ignore_absent_fields() {
     let key = |line: &str| {
         let (bench, _) = request(&words(line), &[]);
         records(&bench.path("run"))[0]["key"]

@@ -76,7 +76,7 @@ fn the_load_is_shared() {
 }
 
 #[test]
-fn a_replica_that_dies_costs_no_trial() {
+fn replica_that_dies_costs_no_trial() {
     let bench = Bench::with_questions(120);
     let replies = AtomicUsize::new(0);
     let dying = MockEndpoint::answering(move |_| {
@@ -101,7 +101,7 @@ fn a_replica_that_dies_costs_no_trial() {
 }
 
 #[test]
-fn a_replica_that_refuses_the_key_is_left_out_and_the_last_one_stops_the_model() {
+fn replicas_without_access_drop_out() {
     let bench = Bench::with_questions(20);
     let locked = MockEndpoint::start([Answer::error(401, "invalid_api_key", "no such key")]);
     let open = slow(5);
@@ -131,7 +131,7 @@ fn a_replica_that_refuses_the_key_is_left_out_and_the_last_one_stops_the_model()
 }
 
 #[test]
-fn a_replica_of_another_model_gives_no_reply() {
+fn replica_of_other_model_is_unused() {
     let bench = Bench::with_questions(40);
     let named = |name: &'static str| {
         MockEndpoint::answering(move |_| {
@@ -188,7 +188,7 @@ fn outcomes(bench: &Bench, model: &str) -> (usize, usize, [usize; 2]) {
 }
 
 #[test]
-fn two_models_at_the_same_replicas_do_not_take_them_from_each_other() {
+fn models_share_replicas() {
     let bench = Bench::with_questions(40);
     let mocks = [
         serving_models(&["qwen", "internvl"]),
@@ -213,7 +213,7 @@ fn two_models_at_the_same_replicas_do_not_take_them_from_each_other() {
 }
 
 #[test]
-fn a_model_that_no_replica_has_leaves_them_to_the_others() {
+fn model_without_replica_leaves_others() {
     let bench = Bench::with_questions(40);
     let mocks = [serving_models(&["m"]), serving_models(&["m"])];
     let called = run_models(
@@ -254,7 +254,7 @@ fn a_model_that_no_replica_has_leaves_them_to_the_others() {
 
 /// What the program can send in another way takes no replica from a model.
 #[test]
-fn a_refused_api_takes_no_replica_from_a_model() {
+fn refused_api_keeps_replicas() {
     let bench = Bench::with_questions(4);
     let responses_alone = || {
         MockEndpoint::watching(|request| {
@@ -284,7 +284,7 @@ fn a_refused_api_takes_no_replica_from_a_model() {
 }
 
 #[test]
-fn replicas_that_serve_a_model_differently_are_said() {
+fn differing_replicas_are_reported() {
     let bench = Bench::with_questions(4);
     let serving = |length: u32| {
         MockEndpoint::watching(move |request| {
@@ -347,7 +347,7 @@ fn limited(rate: f64) -> MockEndpoint {
 
 /// A limit of the user is one for all replicas together.
 #[test]
-fn a_limit_per_minute_holds_for_all_replicas_together() {
+fn rate_limit_covers_all_replicas() {
     let bench = Bench::with_questions(6);
     let times = Arc::new(Mutex::new(VecDeque::new()));
     let watched = || {
@@ -371,7 +371,7 @@ fn a_limit_per_minute_holds_for_all_replicas_together() {
 
 /// Four replicas of ten a second each. What is turned away tells how well each is known; the time depends on the machine.
 #[test]
-fn four_replicas_are_four_times_as_fast() {
+fn four_replicas_quadruple_speed() {
     let bench = Bench::with_questions(240);
     let mocks = [limited(10.0), limited(10.0), limited(10.0), limited(10.0)];
     let called = run(&bench, &mocks.each_ref(), "", "");

@@ -64,7 +64,7 @@ fn mean(picture: &RgbImage) -> f64 {
 }
 
 #[test]
-fn all_images_of_a_row_are_sent_in_one_request() {
+fn row_images_share_one_request() {
     let bench = bench();
     let endpoint = MockEndpoint::start([Answer::text("A")]);
     let url = endpoint.base_url();
@@ -183,7 +183,7 @@ fn images_are_made_again(bench: &Bench) {
 }
 
 #[test]
-fn an_image_has_its_own_noise_wherever_it_is_shown() {
+fn noise_is_independent_of_position() {
     let bench = bench();
     let endpoint = MockEndpoint::start([Answer::text("A")]);
     let url = endpoint.base_url();

@@ -31,7 +31,7 @@ fn summary(bench: &Bench) -> Value {
 }
 
 #[test]
-fn a_larger_limit_asks_only_truncated_replies_again() {
+fn larger_limit_repeats_truncated_only() {
     let (bench, mock) = (Bench::with_questions(10), thinking());
     let first = call(&bench, &mock, "--max-tokens 64");
     assert_eq!((first.code, mock.requests().len()), (Some(0), 10));
@@ -72,7 +72,7 @@ fn a_larger_limit_asks_only_truncated_replies_again() {
 }
 
 #[test]
-fn a_reply_truncated_twice_is_asked_with_each_larger_limit() {
+fn twice_truncated_reply_is_repeated() {
     let bench = Bench::with_questions(3);
     let mock = MockEndpoint::start([Answer::message(&json!({"content": "Let me"}), "length")]);
     for (limit, requests) in [(64, 3), (64, 3), (128, 6), (128, 6), (256, 9)] {
@@ -82,7 +82,7 @@ fn a_reply_truncated_twice_is_asked_with_each_larger_limit() {
 }
 
 #[test]
-fn a_failure_does_not_replace_a_truncated_reply() {
+fn failure_does_not_replace_truncated_reply() {
     let bench = Bench::with_questions(2);
     let cut = Answer::message(&json!({"content": "It is B. Let me"}), "length");
     let refused = Answer::error(400, "x", "no");

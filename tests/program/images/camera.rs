@@ -61,7 +61,7 @@ fn columns(run: &Path, file: &str, names: &[&str]) -> Vec<Vec<String>> {
 
 /// Every table and figure of a run with all four variants keeps exposure times and exposure drops apart.
 #[test]
-fn exposure_times_have_an_axis_of_their_own() {
+fn exposure_times_have_own_axis() {
     let bench = bench(&["T66.67-motion", "T133.33-motion", "L5-noise", "L5-auto"]);
     let stdout = bench.complete(&words(
         "--model script:m.jsonl --data frames --variant all --out run",
@@ -184,7 +184,7 @@ fn the_observer_loses_what_moves() {
 
 /// Images of the camera's variants are made again, and are the same in every part of the program that makes them.
 #[test]
-fn what_the_camera_made_is_made_again() {
+fn what_camera_made_is_made_again() {
     let bench = Bench::new();
     let rooms = "--data rooms:frames=4,size=96x64";
     let light =

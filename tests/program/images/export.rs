@@ -138,7 +138,7 @@ fn a_table_holds_each_image_once() {
 }
 
 #[test]
-fn the_noise_is_that_of_an_evaluation() {
+fn noise_is_that_of_evaluation() {
     let (data, out, dark) = (
         data(),
         tempfile::tempdir().unwrap(),

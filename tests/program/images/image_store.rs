@@ -102,7 +102,7 @@ fn stored_as(bench: &Bench, content: &str) -> Vec<PathBuf> {
 }
 
 #[test]
-fn a_second_model_takes_the_images_of_the_first_and_all_is_as_without() {
+fn second_model_reuses_stored_images() {
     let bench = bench();
     evaluate(&bench, "random", "--out random-alone");
     evaluate(&bench, "observer", "--out observer-alone");
@@ -148,7 +148,7 @@ fn a_second_model_takes_the_images_of_the_first_and_all_is_as_without() {
 }
 
 #[test]
-fn damaged_and_exchanged_images_are_made_again_and_counted() {
+fn damaged_stored_images_are_rebuilt() {
     let bench = bench();
     evaluate(&bench, "random", "--images-cache images --out first");
     let entries = stored(&bench);
@@ -180,7 +180,7 @@ fn damaged_and_exchanged_images_are_made_again_and_counted() {
 }
 
 #[test]
-fn an_enhancer_is_opened_if_an_image_is_missing_and_tried_again_on_other_frames() {
+fn missing_image_opens_the_enhancer() {
     let bench = bench();
     evaluate(&bench, "random", "--images-cache images --out first");
     fs::remove_file(&stored(&bench)[0]).unwrap();
@@ -209,7 +209,7 @@ fn an_enhancer_is_opened_if_an_image_is_missing_and_tried_again_on_other_frames(
 }
 
 #[test]
-fn an_enhancer_that_is_refused_is_refused_with_its_images_in_the_store() {
+fn refused_enhancer_ignores_stored_images() {
     let bench = Bench::new();
     bench.rooms("frames", 3, "96x64");
     onnx::gamma(0.0).write(&bench.path(""), "one.onnx");
@@ -234,7 +234,7 @@ fn an_enhancer_that_is_refused_is_refused_with_its_images_in_the_store() {
 }
 
 #[test]
-fn a_dry_run_says_how_many_images_find_room_and_makes_no_store() {
+fn dry_run_estimates_image_store() {
     let bench = bench();
     let line = "--model random --data frames --levels L3,L5 --llie one.onnx --llie-anyway --dry-run --out run";
     let without = bench.complete(&words(line));
@@ -290,7 +290,7 @@ fn shards_try_an_enhancer_once() {
 }
 
 #[test]
-fn two_processes_share_a_store_that_a_command_lists_and_empties() {
+fn processes_share_one_image_store() {
     let bench = bench();
     std::thread::scope(|scope| {
         for model in ["random", "observer"] {

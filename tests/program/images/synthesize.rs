@@ -49,7 +49,7 @@ fn files_are_what_an_evaluation_sends() {
 
 /// Free drops of light and two readings at once: exposure has no readings, and each noisy image has the name of its own.
 #[test]
-fn any_drop_and_several_readings_are_made() {
+fn any_drop_and_profile_is_made() {
     let bench = Bench::new();
     frames(&bench);
     let light = ["--levels", "L0,3.3", "--profile", "paper,eld"];
@@ -77,7 +77,7 @@ fn any_drop_and_several_readings_are_made() {
 }
 
 #[test]
-fn what_is_there_is_kept_unless_it_is_another() {
+fn existing_images_stay_unless_different() {
     let bench = Bench::new();
     frames(&bench);
     let call = |more: &[&str]| {
@@ -144,7 +144,7 @@ fn encoded_again(path: &Path) -> Vec<u8> {
 }
 
 #[test]
-fn a_json_file_vouches_for_the_bytes_of_its_image() {
+fn json_file_verifies_image_bytes() {
     let bench = Bench::new();
     frames(&bench);
     let call = |more: &str| {
@@ -294,7 +294,7 @@ fn a_file_makes_its_image_again() {
 }
 
 #[test]
-fn one_broken_frame_does_not_stop_the_others() {
+fn broken_frame_fails_alone() {
     let bench = Bench::new();
     frames(&bench);
     bench.file("frames/b.png", "no image");
@@ -309,7 +309,7 @@ fn one_broken_frame_does_not_stop_the_others() {
 }
 
 #[test]
-fn what_makes_no_sense_is_one_line() {
+fn senseless_calls_get_one_line() {
     let bench = Bench::new();
     frames(&bench);
     fs::copy(bench.path("frames/a.png"), bench.path("frames/a.PNG")).unwrap();
@@ -401,7 +401,7 @@ fn exposure(of: &Value) -> [Option<f64>; 7] {
 /// Automatic exposure and motion blur: their files hold what the camera did, make the image again byte for byte, and are what an
 /// evaluation sends.
 #[test]
-fn a_camera_that_meets_the_dark_and_moves() {
+fn camera_that_meets_dark_and_moves() {
     let bench = Bench::new();
     frames(&bench);
     let light = words(
@@ -476,7 +476,7 @@ fn a_camera_that_meets_the_dark_and_moves() {
 
 /// A focal length that the data state counts, and the field of view of the flag does not.
 #[test]
-fn frames_with_a_known_camera_use_it() {
+fn frames_with_known_camera_use_it() {
     let bench = Bench::new();
     let rooms = bench.call(&words("rooms --out rooms --frames 1 --size 96x64"));
     assert_eq!(rooms.code, Some(0), "{rooms:?}");
@@ -515,7 +515,7 @@ fn walk(folder: &Path, end: &str) -> std::path::PathBuf {
 }
 
 #[test]
-fn what_the_camera_cannot_do_is_refused() {
+fn what_camera_cannot_do_is_refused() {
     let bench = Bench::new();
     frames(&bench);
     check_rows(
@@ -566,7 +566,7 @@ fn what_the_camera_cannot_do_is_refused() {
 
 /// A sheet has a row for each variant, and a block of its own for exposure times.
 #[test]
-fn sheets_show_the_variants_that_are_asked() {
+fn sheets_show_variants_that_are_asked() {
     let bench = Bench::new();
     frames(&bench);
     let height = |variant: &str, out: &str| {

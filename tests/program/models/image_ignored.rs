@@ -96,7 +96,7 @@ fn call(answer: impl Fn(&Asked) -> Answer + Send + Sync + 'static) -> (Called, V
 }
 
 #[test]
-fn dropped_images_are_the_first_alert_and_said_during_the_run() {
+fn dropped_images_raise_first_alert() {
     let (called, alerts) = call(Asked::by_words);
     let words = "The replies of m do not depend on the image: ";
     assert_eq!(called.stderr.matches(words).count(), 1, "{called:?}");
@@ -111,7 +111,7 @@ fn dropped_images_are_the_first_alert_and_said_during_the_run() {
 }
 
 #[test]
-fn images_that_every_second_request_loses_are_found() {
+fn every_second_image_lost_is_found() {
     let count = AtomicUsize::new(0);
     let (called, alerts) = call(
         move |asked| match count.fetch_add(1, Ordering::Relaxed) % 2 {
@@ -125,7 +125,7 @@ fn images_that_every_second_request_loses_are_found() {
 }
 
 #[test]
-fn a_model_that_falls_back_on_the_words_in_the_dark_is_not_named() {
+fn word_guessing_in_dark_is_allowed() {
     let (called, alerts) = call(|asked| {
         if asked.is_dark {
             asked.by_words()

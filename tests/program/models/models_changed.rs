@@ -56,7 +56,7 @@ fn endpoint() -> MockEndpoint {
 }
 
 #[test]
-fn a_model_that_is_taken_out_is_left_out_and_kept() {
+fn removed_model_is_excluded_but_kept() {
     let mock = endpoint();
     let url = mock.base_url();
     let bench = Bench::with_questions(2);
@@ -106,7 +106,7 @@ fn a_model_that_is_taken_out_is_left_out_and_kept() {
 
 /// The control of the observer is asked with it, and no file names it.
 #[test]
-fn a_control_of_the_observer_goes_with_it() {
+fn control_of_observer_goes_with_it() {
     let bench = Bench::new();
     let [observer, random] = ["observer", "random"].map(|id| format!("[[model]]\nid = \"{id}\"\n"));
     let line = "--models models.toml --levels L0 --out run";
@@ -142,7 +142,7 @@ fn a_control_of_the_observer_goes_with_it() {
 }
 
 #[test]
-fn a_model_with_other_settings_is_another_model() {
+fn changed_settings_make_another_model() {
     let mock = endpoint();
     let url = mock.base_url();
     let bench = Bench::with_questions(3);
@@ -234,7 +234,7 @@ fn two_models_may_exchange_their_names() {
 
 /// A model is asked with and without images under two names; they differ in nothing else.
 #[test]
-fn replies_with_and_without_images_keep_apart_under_new_names() {
+fn renamed_models_separate_blind_replies() {
     const BLIND: &str = "view = \"blind\"";
     // Right (C) where there is an image.
     let mock = MockEndpoint::answering(|body| {
@@ -299,7 +299,7 @@ fn replies_with_and_without_images_keep_apart_under_new_names() {
 }
 
 #[test]
-fn models_whose_requests_were_changed_are_marked() {
+fn models_with_adapted_requests_are_marked() {
     let strict = MockEndpoint::answering(|body| match body.get("temperature") {
         Some(_) => Answer::error(
             400,
@@ -357,7 +357,7 @@ fn models_whose_requests_were_changed_are_marked() {
 }
 
 #[test]
-fn columns_about_models_are_shown_on_demand() {
+fn model_columns_show_on_demand() {
     let mock = endpoint();
     let url = mock.base_url();
     let bench = Bench::with_questions(2);

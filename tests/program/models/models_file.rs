@@ -52,7 +52,7 @@ fn keys(bench: &Bench, run: &str) -> BTreeMap<(String, String), String> {
 }
 
 #[test]
-fn models_at_several_endpoints_are_asked_in_one_run() {
+fn one_run_asks_several_endpoints() {
     let (one, two) = (
         MockEndpoint::start([Answer::text("A")]),
         MockEndpoint::start([Answer::text("C")]),
@@ -165,7 +165,7 @@ fn limit_sent(models: &str, line: &str, variable: Option<&str>) -> Value {
 }
 
 #[test]
-fn a_model_is_above_the_flags_and_the_flags_are_above_the_defaults() {
+fn model_overrides_flags_override_defaults() {
     const BARE: &str = "[[model]]\nid = \"m\"\nendpoints = [\"URL\"]\n";
     let defaults = format!("[defaults]\nmax-tokens = 12\n{BARE}");
     let own = format!("{defaults}max_tokens = 14\n");
@@ -181,7 +181,7 @@ fn a_model_is_above_the_flags_and_the_flags_are_above_the_defaults() {
 }
 
 #[test]
-fn a_flag_that_a_model_overrides_is_said_once() {
+fn overridden_flag_is_reported_once() {
     let mock = MockEndpoint::start([Answer::text("A")]);
     let url = mock.base_url();
     let table =
@@ -197,7 +197,7 @@ fn a_flag_that_a_model_overrides_is_said_once() {
 }
 
 #[test]
-fn what_is_wrong_in_a_file_is_named_by_line() {
+fn file_errors_name_their_line() {
     let table = |line: &str| {
         format!("[[model]]\nid = \"m\"\nendpoints = [\"http://127.0.0.1:9/v1\"]\n{line}\n")
     };
@@ -248,7 +248,7 @@ fn what_is_wrong_in_a_file_is_named_by_line() {
 }
 
 #[test]
-fn two_models_with_the_same_trials_are_refused() {
+fn models_with_same_trials_are_refused() {
     let table = |name: &str, more: &str| {
         format!(
             "[[model]]\nname = \"{name}\"\nid = \"m\"\nendpoints = [\"http://127.0.0.1:9/v1\"]\n{more}\n"
@@ -277,7 +277,7 @@ fn two_models_with_the_same_trials_are_refused() {
 }
 
 #[test]
-fn flags_and_a_file_make_the_same_trials() {
+fn flags_and_file_make_same_trials() {
     let mock = MockEndpoint::start([Answer::text("A")]);
     let url = mock.base_url();
     let bench = bench(
@@ -323,7 +323,7 @@ fn flags_and_a_file_make_the_same_trials() {
 }
 
 #[test]
-fn a_fatal_answer_stops_one_model_alone() {
+fn fatal_answer_stops_one_model_alone() {
     let refused = MockEndpoint::start([Answer::error(401, "invalid_api_key", "no such key")]);
     let good = MockEndpoint::start([Answer::text("A")]);
     let table =
@@ -361,7 +361,7 @@ fn a_fatal_answer_stops_one_model_alone() {
 }
 
 #[test]
-fn some_of_the_models_and_some_of_the_questions() {
+fn models_and_questions_can_be_selected() {
     let mock = MockEndpoint::start([Answer::text("A")]);
     let url = mock.base_url();
     let table = |id: &str, more: &str| {
@@ -388,7 +388,7 @@ fn some_of_the_models_and_some_of_the_questions() {
 }
 
 #[test]
-fn a_slow_model_does_not_hold_up_the_others() {
+fn slow_model_does_not_delay_others() {
     let slow = MockEndpoint::answering(|_| {
         std::thread::sleep(Duration::from_millis(120));
         Answer::text("A")
@@ -426,7 +426,7 @@ fn a_slow_model_does_not_hold_up_the_others() {
 }
 
 #[test]
-fn prices_of_a_model_hold_for_its_cost() {
+fn model_price_decides_its_cost() {
     let table = "[[model]]\nid = \"unpriced\"\nendpoints = [\"http://127.0.0.1:9/v1\"]\n";
     let error = call(&bench(1, table), "--max-cost 5").stderr;
     insta::assert_snapshot!(redacted(&error), @"
@@ -457,7 +457,7 @@ fn prices_of_a_model_hold_for_its_cost() {
 }
 
 #[test]
-fn the_command_models_shows_what_each_comes_to() {
+fn models_command_shows_resolved_settings() {
     let mock = MockEndpoint::start([
         Answer::text("B"),
         Answer::text("A"),
@@ -502,7 +502,7 @@ fn the_command_models_shows_what_each_comes_to() {
 }
 
 #[test]
-fn open_questions_take_a_file_of_models() {
+fn open_questions_take_file_of_models() {
     let house = House::new();
     let mock = MockEndpoint::start([Answer::text("A table.")]);
     let url = mock.base_url();
@@ -535,7 +535,7 @@ fn open_questions_take_a_file_of_models() {
 }
 
 #[test]
-fn headers_that_decide_replies_are_part_of_a_trial() {
+fn headers_enter_the_trial_key() {
     let mock = MockEndpoint::start([Answer::text("A")]);
     let url = mock.base_url();
     let table = |name: &str, header: &str, more: &str| {
@@ -564,7 +564,7 @@ fn headers_that_decide_replies_are_part_of_a_trial() {
 }
 
 #[test]
-fn what_is_known_of_a_vendor_is_said_before_anything_is_sent() {
+fn vendor_notes_come_before_requests() {
     let table = |id: &str, url: &str, more: &str| {
         format!("[[model]]\nid = \"{id}\"\nendpoints = [\"{url}\"]\n{more}\n")
     };
@@ -613,7 +613,7 @@ fn what_is_known_of_a_vendor_is_said_before_anything_is_sent() {
 }
 
 #[test]
-fn a_near_miss_of_a_built_in_model_is_refused() {
+fn misspelled_built_in_model_is_refused() {
     let bench = Bench::with_questions(1);
     let called = bench.call(&words("--model rndom --data set.jsonl --out run"));
     assert_eq!(called.code, Some(2));

@@ -48,7 +48,7 @@ fn between<'a>(text: &'a str, start: &str, end: &str) -> &'a str {
 }
 
 #[test]
-fn rows_stand_in_the_order_of_the_file() {
+fn rows_stand_in_order_of_file() {
     let mock = MockEndpoint::start([Answer::text("C")]);
     let url = mock.base_url();
     let tables = NAMES.map(|name| table(name, &url, ""));
@@ -166,7 +166,7 @@ fn tables_are_divided_by_groups() {
 }
 
 #[test]
-fn open_questions_are_shown_in_the_same_order() {
+fn open_report_keeps_file_order() {
     let house = House::new();
     let mock = MockEndpoint::start([Answer::text("4")]);
     let url = mock.base_url();

@@ -35,7 +35,7 @@ fn strange(models: &str, line: &str, variables: &[(&str, &str)]) -> Called {
 }
 
 #[test]
-fn a_file_that_came_with_the_data_takes_nothing_that_is_not_its_own() {
+fn supplied_file_gets_no_foreign_key() {
     const ELSEWHERE: &str = "https://evil.example/v1";
     const OPENAI: &str = "https://api.openai.com/v1";
     let key = [("OPENAI_API_KEY", "sk-0123456789")];
@@ -131,7 +131,7 @@ fn a_file_that_came_with_the_data_takes_nothing_that_is_not_its_own() {
 }
 
 #[test]
-fn what_a_table_leaves_of_the_defaults_is_held_against_its_own_address() {
+fn inherited_defaults_check_model_address() {
     let evil = "https://evil.example/v1";
     let variables = [
         ("OPENAI_API_KEY", "sk-0123456789"),
@@ -216,7 +216,7 @@ fn sent(defaults: &str, more: &str, line: &str) -> crate::support::endpoint::Req
 }
 
 #[test]
-fn the_key_and_headers_of_the_defaults_go_to_each_address() {
+fn default_key_goes_everywhere() {
     let gateway = "key-env = \"GATEWAY_KEY\"";
     let secret = "headers = { X-A = { env = \"AWS_SECRET_ACCESS_KEY\" } }";
     let bearer = |key: &str| Some(format!("Bearer {key}"));
@@ -257,7 +257,7 @@ fn the_key_and_headers_of_the_defaults_go_to_each_address() {
 }
 
 #[test]
-fn a_file_of_another_folder_is_not_checked_with_any_key() {
+fn foreign_file_is_checked_without_key() {
     let mock = MockEndpoint::start([Answer::text("OK")]);
     let bench = Bench::new();
     let key = "key-env = \"AWS_SECRET_ACCESS_KEY\"";
@@ -291,7 +291,7 @@ fn a_file_of_another_folder_is_not_checked_with_any_key() {
 }
 
 #[test]
-fn a_table_of_vendors_says_how_a_host_is_asked() {
+fn vendor_table_defines_host_requests() {
     let mock = MockEndpoint::start([Answer::text("C")]);
     let bench = Bench::with_questions(1);
     let row = "[[vendor]]\nname = \"Mine\"\nhosts = [\"127.0.0.1\"]\nkey = [\"MY_KEY\"]\nheader = \"api-key\"\ntoken-field = \"max_completion_tokens\"\n";
@@ -349,7 +349,7 @@ fn a_table_of_vendors_says_how_a_host_is_asked() {
 }
 
 #[test]
-fn settings_of_the_run_may_stand_in_the_defaults() {
+fn defaults_may_hold_run_settings() {
     let mock = MockEndpoint::start([Answer::text("C")]);
     let url = mock.base_url();
     let bench = Bench::with_questions(1);

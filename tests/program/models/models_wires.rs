@@ -64,7 +64,7 @@ fn by_model(requests: &[Request]) -> BTreeMap<String, &Request> {
 }
 
 #[test]
-fn each_model_has_its_own_wire_and_its_own_words() {
+fn each_model_has_own_wire() {
     let mock = endpoint();
     let url = mock.base_url();
     let bench = bench(&format!(
@@ -121,7 +121,7 @@ fn each_model_has_its_own_wire_and_its_own_words() {
 }
 
 #[test]
-fn the_key_of_a_trial_differs_where_the_reply_may() {
+fn trial_key_follows_reply_settings() {
     let mock = endpoint();
     let url = mock.base_url();
     let key = |more: &str| -> String {
@@ -162,7 +162,7 @@ fn the_key_of_a_trial_differs_where_the_reply_may() {
 }
 
 #[test]
-fn a_model_is_above_the_flag_for_probabilities() {
+fn model_is_above_flag_for_probabilities() {
     let mock = endpoint();
     let url = mock.base_url();
     let models = table("with", &url, "") + &table("without", &url, "probabilities = false");
@@ -191,7 +191,7 @@ fn a_model_is_above_the_flag_for_probabilities() {
 }
 
 #[test]
-fn fields_that_say_a_flag_again_are_refused() {
+fn fields_repeating_flags_are_refused() {
     let mock = endpoint();
     let url = mock.base_url();
     let switch = "body = { chat_template_kwargs = { enable_thinking = false } }";
@@ -241,7 +241,7 @@ fn fields_that_say_a_flag_again_are_refused() {
 }
 
 #[test]
-fn the_table_of_a_file_says_how_each_model_is_asked() {
+fn listing_shows_wire_of_models() {
     let mock = endpoint();
     let bench = bench(&table("m", &mock.base_url(), "wire = \"responses\""));
     assert_eq!(call(&bench, "").code, Some(0));

@@ -49,7 +49,7 @@ fn gain(records: &[Value]) -> (f64, usize) {
 }
 
 #[test]
-fn it_sees_rooms_and_nothing_in_the_images_of_others() {
+fn room_net_knows_only_rooms() {
     let bench = rooms();
     let (seen, _) = gain(&ask(&bench, "--levels L0", "right"));
     assert!(seen > 0.4, "{seen}");
@@ -75,7 +75,7 @@ fn it_sees_rooms_and_nothing_in_the_images_of_others() {
 }
 
 #[test]
-fn it_answers_alike_with_any_number_of_threads() {
+fn threads_keep_room_net_answers() {
     let bench = rooms();
     let flags = "--levels L0,L3 --llie lift";
     ask(&bench, &format!("{flags} --threads 1"), "one");
@@ -88,7 +88,7 @@ fn it_answers_alike_with_any_number_of_threads() {
 }
 
 #[test]
-fn a_runtime_that_cannot_be_loaded_is_named() {
+fn unloadable_runtime_is_named() {
     let bench = Bench::new();
     let called = bench.call(&words(
         "--model room-net --out run --llie-options ort-lib=no-such.so",

@@ -46,7 +46,7 @@ fn texts(folder: &Path) -> Vec<(String, String)> {
 }
 
 #[test]
-fn a_bundle_is_the_run_again_and_the_same_bytes_each_time() {
+fn bundle_is_reproducible() {
     let bench = Bench::new();
     bench.rooms("frames", 4, "160x120");
     bench.complete(&words(
@@ -137,7 +137,7 @@ fn a_bundle_is_the_run_again_and_the_same_bytes_each_time() {
 }
 
 #[test]
-fn models_that_flags_cannot_name_are_a_file_in_the_readme() {
+fn readme_includes_models_file() {
     let [one, two] = [1, 2].map(|_| MockEndpoint::start([Answer::text("A")]));
     let bench = Bench::with_frames();
     let table = |name: &str, mock: &MockEndpoint, more: &str| {
@@ -177,7 +177,7 @@ fn models_that_flags_cannot_name_are_a_file_in_the_readme() {
 }
 
 #[test]
-fn a_judge_needs_no_file_of_models_and_keeps_its_address() {
+fn judge_keeps_address_without_file() {
     let house = House::new();
     let mock = MockEndpoint::start([Answer::text("5")]);
     let base = mock.base_url();
@@ -314,7 +314,7 @@ fn nothing_private_is_in_a_bundle() {
 }
 
 #[test]
-fn runs_of_open_questions_are_bundled_too() {
+fn open_runs_can_be_bundled() {
     let house = House::new();
     house.0.file("a.jsonl", "{\"default\": \"an answer\"}\n");
     house.0.file("j.jsonl", "{\"default\": \"4\"}\n");

@@ -166,7 +166,7 @@ fn every_setting_that_decides_is_named() {
 }
 
 #[test]
-fn other_light_stands_apart_and_shared_light_is_shared() {
+fn shared_light_is_compared() {
     let scene = Scene::new();
     scene.run("", "a");
     scene.run("--seed 1", "b");
@@ -249,7 +249,7 @@ fn other_light_stands_apart_and_shared_light_is_shared() {
 }
 
 #[test]
-fn models_of_one_name_are_named_by_what_differs() {
+fn equal_names_show_their_difference() {
     let scene = Scene::new();
     scene.run("", "a");
     scene.run("--detail low", "b");
@@ -268,7 +268,7 @@ fn models_of_one_name_are_named_by_what_differs() {
 }
 
 #[test]
-fn models_that_were_asked_other_questions_are_compared_by_the_shared_ones() {
+fn other_questions_compare_shared_ones() {
     let scene = Scene::new();
     scene.run("", "a");
     scene.run("--model n --limit 20", "b");
@@ -299,7 +299,7 @@ fn models_that_were_asked_other_questions_are_compared_by_the_shared_ones() {
 }
 
 #[test]
-fn each_side_of_a_baseline_costs_what_its_run_paid() {
+fn baseline_sides_keep_their_cost() {
     let scene = Scene::new();
     for (run, levels, dollars) in [
         ("old", "L1,L3", 10),
@@ -336,7 +336,7 @@ fn each_side_of_a_baseline_costs_what_its_run_paid() {
 }
 
 #[test]
-fn a_new_run_is_held_against_a_baseline() {
+fn new_run_is_held_against_baseline() {
     let scene = Scene::new();
     let run = |answers: &str, more: &str, out: &str| {
         scene.bench.file("m.jsonl", answers);
@@ -422,7 +422,7 @@ fn a_new_run_is_held_against_a_baseline() {
 }
 
 #[test]
-fn marks_of_two_judges_are_not_compared() {
+fn marks_of_different_judges_stay_apart() {
     let house = House::new();
     house.0.file("a.jsonl", "{\"default\": \"an answer\"}");
     for (judge, mark) in [("one", "2"), ("two", "4")] {

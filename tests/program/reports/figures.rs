@@ -73,7 +73,7 @@ fn data(scene: &Scene, name: &str) -> (BTreeMap<String, String>, Vec<BTreeMap<St
 }
 
 #[test]
-fn every_number_is_that_of_the_tables_and_the_bytes_are_the_same_twice() {
+fn figures_match_tables_reproducibly() {
     let scene = runs();
     for out in ["first", "second"] {
         let line = format!("figures run --out {out} --format pdf,svg,tex --columns 2");
@@ -165,7 +165,7 @@ fn names_and_widths_are_the_readers() {
 }
 
 #[test]
-fn what_is_not_known_is_refused_with_what_is() {
+fn unknown_names_list_the_known() {
     let scene = runs();
     let wrong = [
         ("--label nobody=A", "script:m.jsonl"),
@@ -194,7 +194,7 @@ fn what_is_not_known_is_refused_with_what_is() {
 }
 
 #[test]
-fn one_model_in_the_light_has_the_figures_there_are() {
+fn single_bright_model_has_figures() {
     let scene = Scene::new();
     scene.bench.file("m.jsonl", "{\"default\": \"red\"}");
     let line = "--model script:m.jsonl --data frames --levels L0 --out run";
@@ -239,7 +239,7 @@ fn one_model_in_the_light_has_the_figures_there_are() {
 }
 
 #[test]
-fn models_that_were_not_asked_in_the_light_of_the_sheet_are_named() {
+fn sheet_names_models_not_asked() {
     let scene = Scene::new();
     for (name, more) in [("a", "--seed 0"), ("b", "--seed 1")] {
         scene
@@ -275,7 +275,7 @@ fn models_that_were_not_asked_in_the_light_of_the_sheet_are_named() {
 }
 
 #[test]
-fn a_run_of_open_questions_is_refused_with_what_to_do() {
+fn open_run_figures_name_remedy() {
     let house = House::new();
     let model = MockEndpoint::start([Answer::text("one")]);
     let base = model.base_url();
@@ -302,7 +302,7 @@ fn document(width: f64) -> String {
 }
 
 #[test]
-fn tex_sets_figures_and_tables_in_their_columns() {
+fn tex_fits_its_columns() {
     // Packages that `document` loads, and the metrics of its font.
     let files = [
         "mathptmx.sty",

@@ -13,7 +13,7 @@ fn table(text: &str) -> Vec<&str> {
 }
 
 #[test]
-fn findings_are_the_words_of_the_summary_and_cells_cannot_break_the_table() {
+fn markdown_repeats_findings_safely() {
     let bench = Bench::new();
     bench.rooms("frames", 8, "160x120");
     bench.file("a|`b`<b>.jsonl", "{\"default\": \"A\"}\n");
@@ -54,7 +54,7 @@ fn findings_are_the_words_of_the_summary_and_cells_cannot_break_the_table() {
 }
 
 #[test]
-fn runs_without_true_answers_and_open_questions_have_it_too() {
+fn open_and_unlabelled_runs_have_markdown() {
     let bench = Bench::new();
     bench.rooms("frames", 2, "96x64");
     bench.complete(&words(

@@ -128,7 +128,7 @@ fn assert_rows_are_records(run: &Path) {
 }
 
 #[test]
-fn the_table_has_every_record_and_counts_as_the_summary_does() {
+fn record_table_matches_the_summary() {
     let bench = Bench::new();
     bench.rooms("frames", 4, "120x90");
     bench.complete(&words(
@@ -164,7 +164,7 @@ fn the_table_has_every_record_and_counts_as_the_summary_does() {
 }
 
 #[test]
-fn written_again_and_from_parts_it_is_the_same() {
+fn rebuilt_record_table_is_identical() {
     let bench = Bench::new();
     bench.rooms("frames", 6, "120x90");
     let args = "--model random --blind-model random --levels L0,L2 --data frames";
@@ -201,7 +201,7 @@ fn written_again_and_from_parts_it_is_the_same() {
 }
 
 #[test]
-fn failures_refusals_and_odd_texts_are_as_in_the_records() {
+fn record_table_keeps_odd_texts() {
     let bench = Bench::with_questions(4);
     let refused = json!({"role": "assistant", "content": null, "refusal": "I won't \u{1b}[1m."});
     let endpoint = MockEndpoint::start([
@@ -262,7 +262,7 @@ fn failures_refusals_and_odd_texts_are_as_in_the_records() {
 }
 
 #[test]
-fn a_table_that_is_not_as_new_as_the_records_is_noticed() {
+fn outdated_record_table_is_noticed() {
     let bench = Bench::new();
     bench.rooms("frames", 2, "120x90");
     let args = "--model random --levels L0 --data frames --out run";
@@ -298,7 +298,7 @@ fn a_table_that_is_not_as_new_as_the_records_is_noticed() {
 }
 
 #[test]
-fn open_questions_have_a_row_an_answer_with_its_mark() {
+fn open_record_table_has_marks() {
     let house = House::new();
     house.0.file(
         "a.jsonl",
@@ -378,7 +378,7 @@ fn duckdb_counts_as_the_summary_does() {
 
 /// The example and the summary of a run agree on every model, level and variant.
 #[test]
-fn the_example_computes_the_accuracy_of_the_summary() {
+fn example_computes_accuracy_of_summary() {
     let run = Path::new(env!("CARGO_MANIFEST_DIR")).join("results/reference");
     let scores = accuracy::accuracy(&run).unwrap();
     let mut expected = BTreeMap::<[String; 3], accuracy::Score>::new();
@@ -398,7 +398,7 @@ fn the_example_computes_the_accuracy_of_the_summary() {
 }
 
 #[test]
-fn records_have_the_columns_and_rows_of_the_table() {
+fn exported_records_match_table() {
     let run = Path::new(env!("CARGO_MANIFEST_DIR")).join("results/reference");
     let records = darkqa_eval::StoredRun::open(&run)
         .unwrap()

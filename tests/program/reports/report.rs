@@ -107,7 +107,7 @@ fn several_runs_become_one_comparison() {
 }
 
 #[test]
-fn runs_that_cannot_be_compared_are_named() {
+fn incomparable_runs_are_named() {
     let bench = Bench::with_questions(3);
     run(&bench, "one", "");
     let text = fs::read_to_string(bench.path("set.jsonl")).unwrap();
@@ -139,7 +139,7 @@ fn runs_that_cannot_be_compared_are_named() {
 }
 
 #[test]
-fn broken_records_are_named_or_passed_over() {
+fn broken_records_are_named_or_skipped() {
     let bench = Bench::with_questions(3);
     run(&bench, "run", "");
     let path = bench.path("run/records.jsonl");
@@ -180,7 +180,7 @@ fn broken_records_are_named_or_passed_over() {
 }
 
 #[test]
-fn a_running_run_is_counted_by_its_records() {
+fn active_run_is_counted_by_records() {
     let bench = Bench::with_questions(3);
     run(&bench, "run", "");
     let path = bench.path("run/records.jsonl");
@@ -304,7 +304,7 @@ fn what_was_sent_is_made_again() {
 }
 
 #[test]
-fn an_item_is_drawn_as_one_picture() {
+fn item_is_drawn_as_one_picture() {
     let bench = Bench::new();
     let rooms = "rooms:frames=3,size=96x64";
     bench.complete(&words(&format!(
@@ -497,7 +497,7 @@ fn people_enter_as_a_model() {
 }
 
 #[test]
-fn no_line_of_all_tables_is_wider_than_the_terminal() {
+fn tables_fit_the_terminal() {
     let bench = Bench::with_questions(12);
     // Names of thirty letters.
     let models = ["a", "b"].map(|end| format!("a-model-of-thirty-letters-72-{end}.jsonl"));
@@ -522,7 +522,7 @@ fn no_line_of_all_tables_is_wider_than_the_terminal() {
 }
 
 #[test]
-fn signs_have_colours_where_they_are_wanted() {
+fn symbols_are_coloured_on_demand() {
     let bench = Bench::with_questions(12);
     run(&bench, "one", "");
     run(&bench, "two", "--seed 1");

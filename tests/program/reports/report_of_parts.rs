@@ -51,7 +51,7 @@ fn report_in(bench: &Bench, folder: &str) -> String {
 }
 
 #[test]
-fn parts_report_what_the_merged_run_does() {
+fn parts_report_what_merged_run_does() {
     let bench = Bench::new();
     for part in ["1/3", "2/3", "3/3"] {
         bench.complete(&evaluation(&format!("--out a --shard {part}")));
@@ -109,7 +109,7 @@ fn parts_report_what_the_merged_run_does() {
 }
 
 #[test]
-fn what_parts_lack_is_said_with_the_command_that_asks_it() {
+fn missing_shards_name_their_command() {
     let bench = Bench::new();
     bench.complete(&words("plan --model observer --levels L0,L3 --out a"));
     let flags = "--model observer --levels L0,L3";

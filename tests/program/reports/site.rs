@@ -98,7 +98,7 @@ fn assert_equal(
 }
 
 #[test]
-fn every_number_is_that_of_the_runs_own_files() {
+fn site_numbers_match_run_files() {
     let bench = two_runs();
     let board = rows(&bench, "site/leaderboard.csv");
     assert_eq!(board.len(), 3);
@@ -164,7 +164,7 @@ fn every_number_is_that_of_the_runs_own_files() {
 }
 
 #[test]
-fn models_are_ranked_and_the_pages_are_those_of_the_runs() {
+fn site_ranks_models_and_links_pages() {
     let bench = two_runs();
     let board = rows(&bench, "site/leaderboard.csv");
     // The better one is first, the reference has no rank.
@@ -199,7 +199,7 @@ fn models_are_ranked_and_the_pages_are_those_of_the_runs() {
 }
 
 #[test]
-fn only_what_was_asked_in_the_same_way_shares_a_table() {
+fn tables_share_only_equal_settings() {
     let bench = Bench::with_questions(6);
     scripts(&bench);
     let run = |out: &str, more: &str| {
@@ -240,7 +240,7 @@ fn only_what_was_asked_in_the_same_way_shares_a_table() {
 }
 
 #[test]
-fn nothing_of_a_stranger_reaches_the_page_as_markup() {
+fn foreign_text_is_escaped() {
     let bench = Bench::with_questions(3);
     let evil = "<img src=x onerror=alert(1)>.jsonl";
     bench.file(evil, "{\"default\": \"A\"}\n");
@@ -296,7 +296,7 @@ fn nothing_of_a_stranger_reaches_the_page_as_markup() {
 }
 
 #[test]
-fn runs_that_cannot_be_read_and_folders_of_others_are_refused() {
+fn unreadable_and_foreign_folders_are_refused() {
     let bench = Bench::with_questions(3);
     let line = "--model random --data set.jsonl --levels L0,L5 --out";
     for run in ["one", "broken", "older"] {
@@ -342,7 +342,7 @@ fn runs_that_cannot_be_read_and_folders_of_others_are_refused() {
 
 #[cfg(unix)]
 #[test]
-fn no_page_is_written_through_a_link() {
+fn no_page_is_written_through_link() {
     let bench = Bench::with_questions(3);
     bench.complete(&words(
         "--model random --data set.jsonl --levels L0,L5 --out one",
@@ -360,7 +360,7 @@ fn no_page_is_written_through_a_link() {
 }
 
 #[test]
-fn open_questions_have_a_table_of_their_own_and_photographs_without_labels_none() {
+fn open_questions_have_own_table() {
     let house = House::new();
     house.0.file("a.jsonl", "{\"default\": \"an answer\"}\n");
     house.0.file("j.jsonl", "{\"default\": \"4\"}\n");

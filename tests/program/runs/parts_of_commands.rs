@@ -133,7 +133,7 @@ fn sets_are_exported_in_parts() {
 }
 
 #[test]
-fn questions_are_made_from_what_parts_measured() {
+fn shard_measurements_make_questions() {
     let bench = with_frames();
     bench.complete(&words("questions frames --out whole/q.jsonl"));
     for part in ["1/3", "2/3", "3/3"] {

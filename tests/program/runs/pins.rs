@@ -103,7 +103,7 @@ fn exam() -> Bench {
 }
 
 #[test]
-fn holm_corrects_within_a_pair_of_models_and_a_kind() {
+fn holm_corrects_within_models_and_kind() {
     let bench = exam();
     let line = "--data set.jsonl --model script:a.jsonl --model script:b.jsonl --model script:c.jsonl --levels L0,L1,L4 \
                 --out run";
@@ -181,7 +181,7 @@ fn holm_corrects_within_a_pair_of_models_and_a_kind() {
 // ---- A torn last line ----
 
 #[test]
-fn a_long_torn_line_is_cut_off_whole() {
+fn long_torn_line_is_removed() {
     const STEP: usize = 64 * 1024;
     let bench = Bench::with_questions(3);
     let endpoint = MockEndpoint::start([Answer::text("C")]);
@@ -240,7 +240,7 @@ fn outage(length: usize) -> (Option<i32>, String, usize) {
 }
 
 #[test]
-fn an_outage_of_fewer_than_three_windows_is_survived() {
+fn outage_under_three_windows_survives() {
     let (code, output, failed) = outage(30);
     assert_eq!((code, failed), (Some(1), 30), "{output}");
     let (code, output, failed) = outage(59);
@@ -248,7 +248,7 @@ fn an_outage_of_fewer_than_three_windows_is_survived() {
 }
 
 #[test]
-fn an_outage_of_three_windows_stops_the_run() {
+fn outage_of_three_windows_stops_run() {
     let (code, output, failed) = outage(1000);
     assert_eq!(code, Some(2), "{output}");
     insta::assert_snapshot!(redacted(&output), @"
@@ -262,7 +262,7 @@ fn an_outage_of_three_windows_stops_the_run() {
 // ---- The frames that a report shows ----
 
 #[test]
-fn small_copies_are_kept_of_the_frames_of_lowest_digest() {
+fn thumbnails_follow_lowest_digests() {
     const FRAMES: usize = 60;
     const MOST: usize = 48;
     let bench = Bench::new();
@@ -324,7 +324,7 @@ fn cut_report(cut: usize, output: &Value) -> String {
 }
 
 #[test]
-fn a_limit_that_cuts_most_replies_is_warned_of() {
+fn truncating_limit_warns() {
     let output = cut_report(6, &Value::Null);
     insta::assert_snapshot!(redacted(&output), @"
     WARN 6 of the first 10 replies were cut at the token limit before any text: a reasoning model needs a larger
@@ -393,7 +393,7 @@ fn counts(house: &House) -> BTreeMap<String, usize> {
 }
 
 #[test]
-fn enhanced_walks_go_through_batch_and_page() {
+fn enhanced_walks_use_batch_and_page() {
     let house = bright_house();
     let silent = MockEndpoint::start([Answer::error(400, "bad", "must not be asked")]);
     let line = format!("{OPEN} {}", silent.base_url());
@@ -475,7 +475,7 @@ fn enhanced_walks_go_through_batch_and_page() {
 }
 
 #[test]
-fn enhanced_walks_go_on_where_they_were_stopped() {
+fn stopped_enhanced_walks_resume() {
     let house = bright_house();
     let answered = std::iter::repeat_n(Answer::text("one"), 4);
     let refused = Answer::error(401, "invalid_api_key", "no");
@@ -511,7 +511,7 @@ fn enhanced_walks_go_on_where_they_were_stopped() {
 // ---- Replies without an answer ----
 
 #[test]
-fn a_null_or_refused_reply_is_no_answer() {
+fn null_or_refused_reply_is_unanswered() {
     let house = House::new();
     let model = MockEndpoint::start([
         Answer::message(&json!({"content": null}), "stop"),

@@ -32,7 +32,7 @@ fn json(path: &Path) -> Value {
 }
 
 #[test]
-fn parts_with_a_plan_are_together_what_one_run_without_is() {
+fn planned_shards_equal_one_run() {
     let bench = with_frames();
     bench.complete(&words(&format!("{FLAGS} --out whole")));
     let said = bench.complete(&words(&format!("plan {FLAGS} --out run")));
@@ -77,7 +77,7 @@ fn parts_with_a_plan_are_together_what_one_run_without_is() {
 
 /// Every file of a frame of other parts is none that could be read.
 #[test]
-fn a_part_opens_only_the_frames_that_it_asks_about() {
+fn shard_opens_only_its_frames() {
     let bench = with_frames();
     let part = |flags: &str| {
         let line = format!("{flags} --data frames --levels L0,L2 --out run --shard 2/4");
@@ -122,7 +122,7 @@ fn a_part_opens_only_the_frames_that_it_asks_about() {
 }
 
 #[test]
-fn a_plan_of_another_run_is_refused_by_the_setting() {
+fn foreign_plan_names_the_setting() {
     let bench = Bench::new();
     let flags = "--model random --levels L0,L2 --data rooms:frames=4,size=120x90";
     bench.complete(&words(&format!("plan {flags} --out run")));
@@ -169,7 +169,7 @@ fn a_plan_of_another_run_is_refused_by_the_setting() {
 }
 
 #[test]
-fn a_frame_that_has_changed_since_the_plan_is_named() {
+fn frame_changed_since_plan_is_named() {
     let bench = with_frames();
     bench.complete(&words(&format!("plan {FLAGS} --out run")));
     let frames = lines(&bench.path("run/plan/frames.jsonl"));
@@ -206,7 +206,7 @@ fn a_frame_that_has_changed_since_the_plan_is_named() {
 }
 
 #[test]
-fn what_is_missing_is_said_with_the_command_that_asks_it() {
+fn missing_planned_shards_name_command() {
     let bench = with_frames();
     bench.complete(&words(&format!("plan {FLAGS} --out run")));
     for part in ["1/6", "2/6", "3/6", "5/6", "6/6"] {
@@ -255,7 +255,7 @@ fn what_is_missing_is_said_with_the_command_that_asks_it() {
 }
 
 #[test]
-fn parts_of_a_plan_cost_about_the_same() {
+fn parts_of_plan_cost_about_same() {
     let bench = Bench::new();
     // Four small frames, and four with sixteen times the pixels.
     let lines = (0..8).map(|i| {
@@ -282,7 +282,7 @@ fn parts_of_a_plan_cost_about_the_same() {
 }
 
 #[test]
-fn a_part_may_cost_its_share_of_the_estimate() {
+fn shard_may_cost_its_share() {
     let bench = Bench::new();
     let mock = MockEndpoint::start([Answer::text("A")]);
     // One question about the first frame, and nine about the second.

@@ -28,7 +28,7 @@ fn timeless(run: &std::path::Path) -> BTreeMap<String, Value> {
 }
 
 #[test]
-fn parts_are_together_what_one_run_is() {
+fn shards_equal_one_run() {
     let bench = Bench::new();
     bench.complete(&args("--out whole"));
     for part in ["1/4", "2/4", "3/4", "4/4"] {
@@ -63,7 +63,7 @@ fn parts_are_together_what_one_run_is() {
 }
 
 #[test]
-fn a_batch_system_says_which_part_it_is() {
+fn batch_system_names_the_shard() {
     let bench = Bench::new();
     let task = |variables: &[(&str, &str)], more: &str| {
         let mut command = bench.command(&args(more));
@@ -97,7 +97,7 @@ fn a_batch_system_says_which_part_it_is() {
 }
 
 #[test]
-fn missing_double_and_foreign_parts_are_named() {
+fn missing_and_foreign_shards_are_named() {
     let bench = Bench::new();
     bench.complete(&args("--out parts --shard 1/3"));
     bench.complete(&args("--out parts --shard 3/3"));
@@ -140,7 +140,7 @@ fn asked_of(mock: &MockEndpoint) -> String {
 }
 
 #[test]
-fn a_stopped_division_goes_on_with_another_number_of_parts() {
+fn stopped_shards_resume_in_other_number() {
     let bench = Bench::new();
     let mock = MockEndpoint::start([Answer::text("B")]);
     let flags = asked_of(&mock);
@@ -183,7 +183,7 @@ fn a_stopped_division_goes_on_with_another_number_of_parts() {
 }
 
 #[test]
-fn replies_that_two_parts_paid_for_are_said() {
+fn doubly_paid_replies_are_reported() {
     let bench = Bench::new();
     let mock = MockEndpoint::start([Answer::text("A"), Answer::text("B")]);
     let flags = asked_of(&mock);
@@ -203,7 +203,7 @@ fn replies_that_two_parts_paid_for_are_said() {
 }
 
 #[test]
-fn limits_and_means_are_shared_by_the_parts() {
+fn shards_share_limits_and_resources() {
     let bench = Bench::with_questions(6);
     let mock = MockEndpoint::start([Answer::text("B")]);
     let base = mock.base_url();
@@ -252,7 +252,7 @@ fn limits_and_means_are_shared_by_the_parts() {
 /// The script as a node runs it, with a `scontrol` that writes down what it is told.
 #[cfg(unix)]
 #[test]
-fn the_script_of_slurm_has_a_stopped_task_started_again() {
+fn slurm_script_restarts_stopped_task() {
     use std::os::unix::fs::PermissionsExt as _;
     use std::time::Duration;
 

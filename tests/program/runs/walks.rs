@@ -40,7 +40,7 @@ fn complete(house: &House, more: &str) -> String {
 }
 
 #[test]
-fn parts_are_together_what_one_run_is() {
+fn walk_shards_equal_one_run() {
     let house = House::new();
     scripts(&house);
     complete(&house, "--out whole");
@@ -76,7 +76,7 @@ fn parts_are_together_what_one_run_is() {
 }
 
 #[test]
-fn a_report_is_made_from_the_folder_alone() {
+fn report_is_made_from_folder_alone() {
     let house = House::new();
     scripts(&house);
     let table = complete(&house, "--out run");
@@ -90,7 +90,7 @@ fn a_report_is_made_from_the_folder_alone() {
 }
 
 #[test]
-fn several_runs_are_compared_if_one_judge_marked_them() {
+fn comparison_needs_one_judge() {
     let house = House::new();
     scripts(&house);
     complete(&house, "--out one");
@@ -159,7 +159,7 @@ fn answering_and_marking() -> MockEndpoint {
 }
 
 #[test]
-fn a_model_that_marks_itself_has_its_marks_also_beside_another_run() {
+fn self_marking_model_keeps_its_marks() {
     let house = House::new();
     let mock = answering_and_marking();
     let base = mock.base_url();
@@ -190,7 +190,7 @@ fn a_model_that_marks_itself_has_its_marks_also_beside_another_run() {
 }
 
 #[test]
-fn two_judges_of_one_name_are_two_judges() {
+fn judges_of_one_name_differ() {
     let house = House::new();
     let mock = answering_and_marking();
     let base = mock.base_url();
@@ -227,7 +227,7 @@ fn two_judges_of_one_name_are_two_judges() {
 }
 
 #[test]
-fn the_images_of_a_walk_are_made_again_and_proved() {
+fn walk_images_are_rebuilt_and_verified() {
     let house = House::new();
     scripts(&house);
     complete(&house, "--out run");
@@ -287,7 +287,7 @@ fn time_is_said_of_walks_too() {
 }
 
 #[test]
-fn a_killed_run_goes_on_and_asks_nothing_twice() {
+fn killed_run_repeats_nothing() {
     let house = House::new();
     let mock = MockEndpoint::answering(|request| {
         std::thread::sleep(Duration::from_millis(60));

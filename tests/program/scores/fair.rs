@@ -18,7 +18,7 @@ fn run(bench: &Bench, more: &str) -> String {
 }
 
 #[test]
-fn every_rotation_is_asked_and_an_answer_by_position_averages_out() {
+fn rotation_averages_position_bias() {
     let bench = Bench::with_questions(6);
     bench.file("script.jsonl", "{\"default\":\"A\"}");
     let table = run(&bench, "--model script:script.jsonl --circular");
@@ -67,7 +67,7 @@ fn every_rotation_is_asked_and_an_answer_by_position_averages_out() {
 }
 
 #[test]
-fn chance_is_that_of_what_is_asked() {
+fn chance_follows_asked_questions() {
     let bench = Bench::with_questions(1);
     let question = |id: &str, choices: &[&str]| {
         let question = json!({
@@ -93,7 +93,7 @@ fn chance_is_that_of_what_is_asked() {
 }
 
 #[test]
-fn shuffled_orders_are_the_same_in_every_condition_and_run() {
+fn shuffled_orders_are_stable() {
     let orders = |seed: &str| {
         let bench = Bench::with_questions(6);
         bench.complete(&words(&format!(
@@ -138,7 +138,7 @@ fn repeats_are_trials_of_their_own() {
 }
 
 #[test]
-fn a_constraint_is_sent_and_its_object_is_read() {
+fn constraint_is_sent_and_parsed() {
     let bench = Bench::with_questions(6);
     let mock = MockEndpoint::start([Answer::text("{\"answer\": \"C\"}")]);
     let base = mock.base_url();
@@ -191,7 +191,7 @@ fn a_constraint_is_sent_and_its_object_is_read() {
 }
 
 #[test]
-fn kept_replies_are_read_again_without_a_call() {
+fn stored_replies_are_reparsed_offline() {
     let bench = Bench::with_questions(6);
     bench.file("script.jsonl", "{\"default\":\"C\"}");
     let table = run(&bench, "--model script:script.jsonl");
@@ -230,7 +230,7 @@ fn kept_replies_are_read_again_without_a_call() {
 }
 
 #[test]
-fn a_run_that_an_earlier_version_read_says_what_has_changed() {
+fn earlier_parsing_is_reported() {
     let bench = Bench::with_questions(6);
     bench.file("script.jsonl", "{\"default\":\"I can rule out option C.\"}");
     run(&bench, "--model script:script.jsonl");
@@ -279,7 +279,7 @@ fn a_run_that_an_earlier_version_read_says_what_has_changed() {
 }
 
 #[test]
-fn replies_without_an_answer_are_told_by_reason() {
+fn unanswered_replies_show_their_reason() {
     let bench = Bench::with_questions(6);
     let thinking = json!({"content": null, "reasoning_content": "hmm"});
     let mut answers = vec![Answer::message(&thinking, "length"); 10];

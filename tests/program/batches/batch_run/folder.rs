@@ -7,7 +7,7 @@ use crate::support::run::{Bench, called, words};
 use crate::support::snapshot::redacted;
 
 #[test]
-fn a_detached_run_is_looked_at_fetched_and_cancelled_by_its_folder() {
+fn folder_controls_detached_run() {
     let (bench, mock, called) = blind(
         &[Course::of("in_progress in_progress in_progress completed")],
         "--detach",
@@ -82,7 +82,7 @@ fn a_detached_run_is_looked_at_fetched_and_cancelled_by_its_folder() {
 }
 
 #[test]
-fn built_in_models_and_other_folders_are_refused() {
+fn built_in_models_cannot_be_batched() {
     let bench = Bench::with_questions(QUESTIONS);
     for (args, message) in [
         (
@@ -99,7 +99,7 @@ fn built_in_models_and_other_folders_are_refused() {
 }
 
 #[test]
-fn what_waits_for_the_quota_is_freed_by_a_cancel() {
+fn cancel_frees_parts_awaiting_quota() {
     let full = Answer::error(429, "token_limit_exceeded", "too many enqueued tokens");
     let (bench, mock, called) = blind(&[Course::refused(full)], "--detach");
     insta::assert_snapshot!(called, @"
@@ -127,7 +127,7 @@ fn what_waits_for_the_quota_is_freed_by_a_cancel() {
 }
 
 #[test]
-fn another_address_than_that_of_the_batches_is_left_alone() {
+fn batches_of_other_address_stay() {
     let (bench, mock, _) = blind(&[Course::of("completed")], "--detach");
     let elsewhere = "batch cancel run --base-url http://127.0.0.1:9/v1 --poll 0.02";
     let called = bench.call(&words(elsewhere));
@@ -142,7 +142,7 @@ fn another_address_than_that_of_the_batches_is_left_alone() {
 
 /// A stranger's folder may name any address, and may name parts by paths.
 #[test]
-fn no_key_goes_to_an_address_that_only_the_folder_names() {
+fn no_key_for_address_in_folder() {
     let (bench, _, _) = blind(&[Course::of(&"in_progress ".repeat(100))], "--detach");
     let stranger = MockBatches::start([Course::of("in_progress")]);
     let state = bench.path("run/batch/state.jsonl");
@@ -191,7 +191,7 @@ fn no_key_goes_to_an_address_that_only_the_folder_names() {
 }
 
 #[test]
-fn a_part_is_a_name_and_not_a_path() {
+fn part_is_name_not_path() {
     let (bench, _, _) = blind(&[Course::of("completed")], "--detach");
     let state = bench.path("run/batch/state.jsonl");
     let text = std::fs::read_to_string(&state).unwrap();

@@ -16,7 +16,7 @@ fn assert_stopped(mock: &MockBatches, called: &Called, case: &str) {
 }
 
 #[test]
-fn an_output_that_is_named_later_is_waited_for() {
+fn late_output_is_awaited() {
     let course = Course::of("in_progress completed").late(4);
     let (bench, mock, called) = blind(&[course], "");
     assert_eq!(called.code, Some(0), "{called:?}");
@@ -25,7 +25,7 @@ fn an_output_that_is_named_later_is_waited_for() {
 }
 
 #[test]
-fn an_output_with_too_few_lines_stops_the_run() {
+fn short_output_stops_the_run() {
     for (order, replies) in [(Order::Cut, QUESTIONS - 1), (Order::Empty, 0)] {
         let courses = [
             Course::of("completed").order(order),
@@ -53,7 +53,7 @@ fn assert_each_once_but_lost(bench: &Bench, mock: &MockBatches, again: usize) {
 }
 
 #[test]
-fn a_file_of_the_servers_page_ends_the_wait() {
+fn file_of_servers_page_ends_wait() {
     let (bench, mock, called) = blind(&[Course::of("completed").order(Order::Cut)], "");
     assert_stopped(&mock, &called, "cut");
     let id = mock.asked()[0][QUESTIONS - 1].clone();
@@ -79,7 +79,7 @@ fn a_file_of_the_servers_page_ends_the_wait() {
 }
 
 #[test]
-fn an_output_that_is_deleted_ends_with_a_message() {
+fn deleted_output_stops_with_message() {
     let bench = Bench::with_questions(QUESTIONS);
     let mock = MockBatches::start([Course::of("completed")]);
     for _ in 0..10 {
@@ -101,14 +101,14 @@ fn an_output_that_is_deleted_ends_with_a_message() {
 
 /// A server that counts only some of the requests of a batch that it calls completed.
 #[test]
-fn counts_that_are_not_complete_are_waited_for() {
+fn incomplete_counts_are_awaited() {
     let (bench, mock, called) = blind(&[Course::of("completed").uncounted(1)], "");
     assert_stopped(&mock, &called, "uncounted");
     assert_eq!(answered(&bench).len(), QUESTIONS);
 }
 
 #[test]
-fn fetch_imports_nothing_of_an_incomplete_batch() {
+fn fetch_imports_nothing_of_incomplete_batch() {
     let courses = [Course::of("completed").order(Order::Cut)];
     let (bench, mock, _) = blind(&courses, "--detach");
     let fetched = bench.call(&words("batch fetch run"));
@@ -125,7 +125,7 @@ fn fetch_imports_nothing_of_an_incomplete_batch() {
 }
 
 #[test]
-fn failures_without_a_line_are_asked_again_as_counted() {
+fn uncounted_failures_are_asked_again() {
     let some = Course::of("completed").lines(|i| [Line::Right, Line::Absent][i % 2]);
     let (bench, mock, called) = blind(&[some, Course::of("completed")], "");
     assert_eq!(called.code, Some(0), "{called:?}");
@@ -133,7 +133,7 @@ fn failures_without_a_line_are_asked_again_as_counted() {
 }
 
 #[test]
-fn a_reply_counts_after_a_failure_of_its_request() {
+fn reply_after_failure_counts() {
     let course = Course::of("in_progress completed").order(Order::AfterFailures);
     let (bench, mock, called) = blind(&[course], "");
     assert_eq!(called.code, Some(0), "{called:?}");
@@ -141,7 +141,7 @@ fn a_reply_counts_after_a_failure_of_its_request() {
 }
 
 #[test]
-fn an_expired_batch_without_counts_is_waited_for() {
+fn expired_batch_without_counts_is_awaited() {
     let course = Course::of("in_progress expired").late(4).late_to_count();
     let (bench, mock, called) = blind(&[course], "");
     assert_eq!(called.code, Some(0), "{called:?}");
@@ -150,7 +150,7 @@ fn an_expired_batch_without_counts_is_waited_for() {
 }
 
 #[test]
-fn a_cancelled_batch_is_fetched_before_its_files_are_deleted() {
+fn cancelled_batch_is_fetched_before_deletion() {
     let course = Course::of(&"in_progress ".repeat(1000))
         .lines(|i| if i < 1 { Line::Right } else { Line::Absent })
         .late(3);
@@ -164,7 +164,7 @@ fn a_cancelled_batch_is_fetched_before_its_files_are_deleted() {
 }
 
 #[test]
-fn files_of_a_cancelled_batch_stay_if_they_are_incomplete() {
+fn incomplete_cancelled_batch_keeps_files() {
     let course = Course::of(&"in_progress ".repeat(1000))
         .lines(|i| if i < 1 { Line::Right } else { Line::Absent })
         .late(1000);
@@ -180,7 +180,7 @@ fn files_of_a_cancelled_batch_stay_if_they_are_incomplete() {
 }
 
 #[test]
-fn lost_trials_of_a_batch_are_not_paid_again() {
+fn lost_batch_trials_are_not_repaid() {
     let course = Course::of("in_progress in_progress in_progress completed");
     let (bench, mock, _) = blind(&[course, Course::of("completed")], "--detach");
     std::fs::remove_file(bench.path("run/batch/trials.jsonl")).unwrap();

@@ -69,7 +69,7 @@ fn assert_each_once(bench: &Bench, mock: &MockBatches, trials: usize) {
 }
 
 #[test]
-fn batches_are_submitted_and_their_replies_taken_over() {
+fn batches_are_submitted_and_imported() {
     let bench = Bench::with_questions(QUESTIONS);
     let mock = MockBatches::start([Course::of("validating in_progress finalizing completed")]);
     let called = call_with(RUN, &bench, &mock, "");
@@ -92,7 +92,7 @@ fn batches_are_submitted_and_their_replies_taken_over() {
 }
 
 #[test]
-fn a_refused_field_costs_one_request_or_one_batch() {
+fn refused_field_costs_one_batch() {
     // Directly before the batches.
     let bench = Bench::with_questions(QUESTIONS);
     let mock = MockBatches::start([Course::of("completed")]);
@@ -142,7 +142,7 @@ fn a_refused_field_costs_one_request_or_one_batch() {
 }
 
 #[test]
-fn open_answers_and_their_marks_go_through_batches_one_after_the_other() {
+fn answers_and_marks_use_batches() {
     let house = House::new();
     let mock = MockBatches::start([
         Course::of("in_progress completed").text("brown"),

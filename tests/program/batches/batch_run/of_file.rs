@@ -32,7 +32,7 @@ fn call(bench: &Bench, line: &str) -> Called {
 }
 
 #[test]
-fn batches_of_a_model_are_made_with_its_own_key() {
+fn batches_use_key_of_model() {
     let mock = MockBatches::start([Course::of("in_progress completed")]);
     let keys = [
         "name = \"A\"\nid = \"m\"\nkey-env = \"TEAM_A\"",
@@ -75,7 +75,7 @@ fn batches_of_a_model_are_made_with_its_own_key() {
 }
 
 #[test]
-fn models_with_one_key_are_fetched_by_their_folder() {
+fn folder_fetches_models_with_one_key() {
     let mock = MockBatches::start([Course::of("completed")]);
     let keys = ["id = \"m\"\nrpm = 100", "id = \"n\"\nrpm = 200"];
     let bench = bench_of_two(&mock, keys);
@@ -87,7 +87,7 @@ fn models_with_one_key_are_fetched_by_their_folder() {
 }
 
 #[test]
-fn a_field_that_is_refused_in_a_batch_is_left_out_for_that_model() {
+fn refused_batch_field_affects_one_model() {
     let refused = Course::of("completed").lines(|_| Line::Status(400, TEMPERATURE));
     let mock = MockBatches::start([Course::of("completed"), refused, Course::of("completed")]);
     let keys = [
@@ -113,7 +113,7 @@ fn a_field_that_is_refused_in_a_batch_is_left_out_for_that_model() {
 }
 
 #[test]
-fn a_refused_field_costs_the_batches_that_were_out() {
+fn refused_field_costs_submitted_batches() {
     let refused = Course::of("completed").lines(|_| Line::Status(400, TEMPERATURE));
     let courses = [refused.clone(), refused, Course::of("completed")];
     let (bench, mock, called) = super::blind(&courses, "--file-requests 2");
@@ -123,7 +123,7 @@ fn a_refused_field_costs_the_batches_that_were_out() {
 }
 
 #[test]
-fn a_model_that_cannot_be_asked_stops_alone() {
+fn unusable_model_stops_alone() {
     let mock = MockBatches::start([Course::of("completed")]);
     mock.chat(|body| match body["model"].as_str() {
         Some("typo") => Answer::error(404, "model_not_found", "no such model"),
@@ -148,7 +148,7 @@ fn a_model_that_cannot_be_asked_stops_alone() {
 }
 
 #[test]
-fn a_vendor_that_refuses_batches_stops_its_models_alone() {
+fn vendor_refusing_batches_stops_its_models() {
     let (one, two) = (
         MockBatches::start([Course::failing("x", "this line is no JSON", &Value::Null)]),
         MockBatches::start([Course::of("in_progress completed")]),
@@ -182,7 +182,7 @@ fn a_vendor_that_refuses_batches_stops_its_models_alone() {
 }
 
 #[test]
-fn a_detached_run_keeps_how_its_requests_were_changed() {
+fn detached_run_keeps_adapted_requests() {
     let mock = MockBatches::start([Course::of("completed")]);
     mock.chat(|body| match body.get("temperature") {
         Some(_) => Answer::error(400, "unsupported_value", TEMPERATURE),

@@ -97,7 +97,7 @@ fn walks_become_frames_and_questions() {
 }
 
 #[test]
-fn places_that_cover_a_scene_become_frames_and_questions() {
+fn covering_places_become_frames_and_questions() {
     let house = house();
     house.render(ANNOTATED, "renders", &["--cover"], 0);
     let record = house.json("renders/scenes.json");
@@ -131,7 +131,7 @@ fn places_that_cover_a_scene_become_frames_and_questions() {
 }
 
 #[test]
-fn the_same_seed_gives_the_same_bytes_and_another_gives_others() {
+fn seed_decides_the_bytes() {
     let house = house();
     for (out, seed) in [("a", "3"), ("b", "3"), ("c", "4")] {
         let flags = ["--cover", "--seed", seed, "--scenes", "aaaaAAAA111"];
@@ -144,7 +144,7 @@ fn the_same_seed_gives_the_same_bytes_and_another_gives_others() {
 }
 
 #[test]
-fn what_is_rendered_is_not_rendered_again() {
+fn rendered_scenes_are_not_repeated() {
     let house = house();
     walks(&house);
     let flags = ["--walks", "states"];
@@ -194,7 +194,7 @@ fn what_is_rendered_is_not_rendered_again() {
 }
 
 #[test]
-fn an_archive_of_states_is_read_without_being_unpacked() {
+fn state_archive_is_read_unpacked() {
     let house = house();
     walks(&house);
     house.render(ANNOTATED, "from-folder", &["--walks", "states"], 0);
@@ -235,7 +235,7 @@ fn an_archive_of_states_is_read_without_being_unpacked() {
 }
 
 #[test]
-fn a_pickle_that_calls_anything_is_refused_by_name_and_not_run() {
+fn pickle_with_calls_is_refused() {
     let house = house();
     house.walk("000-hm3d-aaaaAAAA111", 3, "evil");
     house.walk("001-hm3d-bbbbBBBB222", 3, "attrs22");
@@ -287,7 +287,7 @@ fn a_pickle_that_calls_anything_is_refused_by_name_and_not_run() {
 }
 
 #[test]
-fn a_scene_without_any_semantic_number_is_refused_with_the_remedy() {
+fn scene_without_semantics_names_remedy() {
     let house = house();
     walks(&house);
     let said = house.render(PLAIN, "renders", &["--walks", "states"], 1);
@@ -364,7 +364,7 @@ fn wrong_calls_say_what_is_expected() {
 }
 
 #[test]
-fn the_rules_of_the_script_hold_one_by_one() {
+fn script_rules_hold_individually() {
     let house = House::new();
     house.check(include_str!("check_rules.py"));
 }
@@ -373,7 +373,7 @@ fn the_rules_of_the_script_hold_one_by_one() {
 const ISLANDS: &str = r#"{"room": [0, 0, 0, 6, 2.6, 5], "boxes": [], "islands": []}"#;
 
 #[test]
-fn only_the_kind_habitat_has_a_script() {
+fn only_kind_habitat_has_script() {
     let house = House::new();
     let said = house.program(&["import", "nyu", "--script"], 2);
     insta::assert_snapshot!(redacted(&said), @"error: KIND: only the kind habitat has a script, not nyu");

@@ -151,7 +151,7 @@ fn profiles_are_converted_as_littlecms_does() {
 
 /// The same for every eighth shade of grey.
 #[test]
-fn profiles_of_grey_are_converted_as_littlecms_does() {
+fn grey_profiles_match_littlecms() {
     let expected = [
         0, 6, 20, 32, 43, 53, 63, 72, 81, 90, 99, 107, 115, 123, 131, 139, 146, 154, 161, 168, 176,
         183, 190, 197, 203, 210, 217, 223, 230, 237, 243, 249,
@@ -170,7 +170,7 @@ fn profiles_of_grey_are_converted_as_littlecms_does() {
 }
 
 #[test]
-fn what_is_srgb_in_other_words_is_untouched() {
+fn equivalent_srgb_is_untouched() {
     let image = image();
     let profile = rgb_profile("sRGB of a test", SRGB, &srgb_curve());
     let code_points = |points: [u8; 4]| with_chunks(&png(&image), &[chunk(*b"cICP", &points)]);
@@ -214,7 +214,7 @@ fn the_first_information_counts() {
 }
 
 #[test]
-fn what_cannot_be_converted_is_refused_or_taken_as_srgb() {
+fn unconvertible_profile_is_refused_or_ignored() {
     let image = image();
     let with = |kind, data: &[u8]| with_chunks(&png(&image), &[chunk(kind, data)]);
     let mut cut = rgb_profile("P3", DISPLAY_P3, &srgb_curve());
@@ -247,7 +247,7 @@ fn what_cannot_be_converted_is_refused_or_taken_as_srgb() {
 
 /// A few thousand bytes that stand for 64 MB.
 #[test]
-fn a_profile_that_grows_without_bound_is_refused() {
+fn unbounded_profile_is_refused() {
     let bytes = png_with_profile(&image(), &vec![0; 64 << 20]);
     assert!(bytes.len() < 1 << 20);
     let error = fault(bytes.clone());

@@ -38,7 +38,7 @@ fn fault(bytes: Vec<u8>) -> String {
 }
 
 #[test]
-fn lossless_files_have_the_pixels_of_a_png() {
+fn lossless_files_have_pixels_of_png() {
     let image = image();
     for bytes in [
         encoded(&image, ImageFormat::WebP),
@@ -70,7 +70,7 @@ fn lossy_webp_is_read() {
 }
 
 #[test]
-fn orientations_of_webp_and_tiff_are_applied() {
+fn webp_and_tiff_orientation_is_applied() {
     let stored = image();
     for orientation in 1..=8 {
         let expected = seen(&stored, orientation);
@@ -89,7 +89,7 @@ fn orientations_of_webp_and_tiff_are_applied() {
 }
 
 #[test]
-fn of_several_pictures_the_first_is_read() {
+fn of_several_pictures_first_is_read() {
     let first = image();
     let second = RgbImage::from_pixel(7, 4, Rgb([9; 3]));
     let pages = || [Page::rgb(&first), Page::rgb(&second)];
@@ -177,7 +177,7 @@ fn inks_in_a_tiff_become_rgb() {
 }
 
 #[test]
-fn what_cannot_be_shown_as_it_is_is_refused_by_name() {
+fn unsupported_images_are_refused_by_name() {
     let rgb = |tag, value| tiff(Order::Little, &[Page::rgb(&image()).with(tag, value)]);
     let four = Page {
         channels: 4,
@@ -218,7 +218,7 @@ fn what_cannot_be_shown_as_it_is_is_refused_by_name() {
 }
 
 #[test]
-fn a_bomb_is_refused_before_it_is_decompressed() {
+fn decompression_bomb_is_refused_early() {
     let mut webp = webp_of(&[webp_samples(&image())]);
     // 16383 × 16383 pixels: 14 bits each behind the signature of the samples.
     webp[21..25].copy_from_slice(&[0xFE, 0xBF, 0xFF, 0x0F]);
@@ -245,7 +245,7 @@ fn a_bomb_is_refused_before_it_is_decompressed() {
 }
 
 #[test]
-fn a_run_reads_all_formats_of_a_folder() {
+fn run_reads_all_formats_of_folder() {
     let bench = Bench::new();
     let frames = [
         ("a.webp", encoded(&image(), ImageFormat::WebP)),
@@ -292,7 +292,7 @@ fn a_run_reads_all_formats_of_a_folder() {
 }
 
 #[test]
-fn a_folder_of_unread_images_says_what_to_do() {
+fn unread_image_folder_names_remedy() {
     let bench = Bench::new();
     bench.file("photos/IMG_1.HEIC", "x");
     let called = bench.call(&words("synthesize photos --out dark"));

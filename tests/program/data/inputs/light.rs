@@ -87,7 +87,7 @@ fn without_noise(reading: NoiseProfile, light: f32, drop: Severity) -> f64 {
 /// Where the sensor saturates: at white before the drop by the letter of the paper, and after it where less light means fewer
 /// photons.
 #[test]
-fn the_sensor_saturates_as_the_reading_says() {
+fn sensor_saturates_as_reading_says() {
     let drop = Severity::L2;
     for reading in NoiseProfile::ALL {
         // Greys are those of the exposure branch, since no tone curve is undone.
@@ -172,7 +172,7 @@ fn every_lossless_compression_is_read() {
 }
 
 #[test]
-fn what_is_no_light_is_refused_by_name() {
+fn invalid_light_is_refused_by_name() {
     let with = |value: f32| {
         let mut light = vec![0.5; 18];
         light[10] = value;
@@ -381,7 +381,7 @@ fn rooms_have_light() {
 }
 
 #[test]
-fn realism_keeps_the_depth_of_what_is_darkened() {
+fn realism_keeps_bit_depth() {
     let bench = Bench::new();
     bench.file("pairs/normal/1.exr", exr([48, 32], &lights()));
     let made = bench.call(&words(

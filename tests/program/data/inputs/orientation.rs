@@ -19,7 +19,7 @@ fn file(bytes: Vec<u8>) -> ImageFile {
 }
 
 #[test]
-fn all_eight_values_are_a_copy_that_was_turned_by_hand() {
+fn all_orientations_match_turned_copy() {
     let stored = image();
     let coded = file(jpeg(&stored)).decode().unwrap();
     let coded = RgbImage::from_raw(7, 4, coded.samples().to_vec()).unwrap();
@@ -41,7 +41,7 @@ fn all_eight_values_are_a_copy_that_was_turned_by_hand() {
 }
 
 #[test]
-fn a_turn_is_in_the_digest_and_no_other_digest_moves() {
+fn orientation_changes_only_its_digest() {
     let stored = image();
     let plain = [png(&stored), jpeg(&stored), turned_png(&stored, 1)];
     for bytes in plain {
@@ -83,7 +83,7 @@ fn folder(bench: &Bench, name: &str, first: &[u8]) {
 }
 
 #[test]
-fn dark_images_are_those_of_the_copy_that_was_turned_by_hand() {
+fn dark_images_match_turned_copy() {
     let bench = Bench::new();
     folder(&bench, "stated", &turned_png(&image(), 6));
     folder(&bench, "by-hand", &png(&seen(&image(), 6)));
@@ -176,7 +176,7 @@ fn with_map(bench: &Bench, name: &str, size: [u32; 2]) {
 }
 
 #[test]
-fn an_image_with_maps_is_not_turned() {
+fn image_with_maps_is_not_turned() {
     let bench = Bench::new();
     with_map(&bench, "fits", [7, 4]);
     let made = bench.call(&words("synthesize fits --out dark --levels L0"));

@@ -71,7 +71,7 @@ fn fields_are_adapted_once_for_all() {
 
 /// Lists of details name the field by its place.
 #[test]
-fn a_field_is_known_by_the_place_in_a_list_of_details() {
+fn field_is_found_by_detail_location() {
     let details = json!({"object": "error", "message": {"detail": [
         {"type": "extra_forbidden", "loc": ["body", "max_tokens"], "msg": "Extra inputs are not permitted"},
     ]}});
@@ -82,7 +82,7 @@ fn a_field_is_known_by_the_place_in_a_list_of_details() {
 
 /// What the table says of servers on this machine; a model without such a switch is the server's to refuse.
 #[test]
-fn thinking_is_said_in_the_field_of_the_server() {
+fn thinking_uses_field_of_server() {
     let off = || Parameters {
         thinking: Some(Thinking::Off),
         ..Parameters::new("m".into())

@@ -234,7 +234,7 @@ fn waits_are_kept_and_capped() {
 
 /// Being turned away is a wait: it spends no retry, and only `--retries patience` ends it. A limit for the day ends it at once.
 #[test]
-fn a_request_that_is_turned_away_waits_and_spends_no_retry() {
+fn rejected_request_waits_without_retry() {
     let away = || Answer::error(429, "x", "slow").header("retry-after", "0.02");
     let patient = Sending {
         retries: 1,

@@ -40,7 +40,7 @@ fn refuses((name, change, parts): (&str, Change, &[&str])) {
 }
 
 #[test]
-fn files_that_cannot_be_used_are_named() {
+fn unusable_files_are_named() {
     let rows: Vec<(&str, Change, &[&str])> = vec![
         (
             "truncated",

@@ -254,7 +254,7 @@ fn hot_pixels_are_masked_and_counted() {
 
 /// A fixed pattern is taken off from 16 bias frames on; fewer are warned about.
 #[test]
-fn a_fixed_pattern_is_taken_off_where_there_are_frames() {
+fn fixed_pattern_is_removed_with_biases() {
     let (sensor, _) = &*SMALL;
     let shots = Shots::take(sensor, 16, 1);
     // A deviation of 1.9 ADU, where noise has 2.7: half of its variance.
@@ -307,7 +307,7 @@ fn a_fixed_pattern_is_taken_off_where_there_are_frames() {
 
 /// Row noise that cannot be seen is said so, and the camera file says that its line is of nothing.
 #[test]
-fn row_noise_that_cannot_be_seen_is_named() {
+fn invisible_row_noise_is_named() {
     let mut silent = SMALL.1.clone();
     // The rows of both frames of a pair get one mean.
     for pair in silent.bias.chunks_mut(2) {
@@ -340,7 +340,7 @@ fn row_noise_that_cannot_be_seen_is_named() {
 }
 
 #[test]
-fn settings_in_the_wrong_folders_are_named() {
+fn settings_in_wrong_folders_are_named() {
     let bench = Bench::new();
     let at = |gain: f64, seed: u64| Shots::take(&Sensor::new("sony-a7s2", gain, SIDE, seed), 2, 1);
     let shots = [at(0.1879, 4), at(0.7513, 5), at(3.0053, 6), at(6.0106, 7)];

@@ -66,7 +66,7 @@ fn refused(bench: &Bench, flags: &str, expected: &[&str]) {
 }
 
 #[test]
-fn images_of_a_folder_are_a_condition_like_those_of_an_enhancer() {
+fn enhanced_folder_is_a_condition() {
     let bench = bench();
     let called = ask(&bench, "--enhanced mine=made --out run");
     insta::assert_snapshot!(called.messages(), @"
@@ -128,7 +128,7 @@ fn images_of_a_folder_are_a_condition_like_those_of_an_enhancer() {
 }
 
 #[test]
-fn parts_of_a_run_share_a_folder() {
+fn parts_of_run_share_folder() {
     let bench = bench();
     for part in ["1/2", "2/2"] {
         bench.complete(&words(&format!(
@@ -173,7 +173,7 @@ fn each_unusable_image_is_named() {
 }
 
 #[test]
-fn images_of_other_dark_images_are_refused() {
+fn images_of_other_sources_are_refused() {
     let bench = bench();
     let enhanced = "--enhanced mine=made";
     for (flags, expected) in [

@@ -11,7 +11,7 @@ use crate::support::snapshot::redacted;
 use crate::support::table::check_rows;
 
 #[test]
-fn what_no_size_mends_is_named_without_a_multiple() {
+fn unfixable_size_names_no_multiple() {
     let rows = [
         (onnx::doubled(), "enlarges by 2"),
         (onnx::halved(), "24 × 20 for one of 48 × 40"),
@@ -26,7 +26,7 @@ fn what_no_size_mends_is_named_without_a_multiple() {
 }
 
 #[test]
-fn an_image_that_takes_too_long_is_an_error_and_others_go_on() {
+fn slow_image_fails_alone() {
     let (_folder, enhancer) = loaded(&onnx::endless_if_bright());
     let limit = TimeLimit::new(Duration::from_millis(300));
     let mut enhancer = enhancer.with_time_limit(limit);
@@ -61,7 +61,7 @@ fn an_image_that_takes_too_long_is_an_error_and_others_go_on() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn an_image_that_takes_too_much_memory_is_an_error_and_others_go_on() {
+fn memory_hungry_image_fails_alone() {
     let (_folder, enhancer) = loaded(&onnx::endless_if_bright());
     let mut enhancer = enhancer.with_memory_limit("0.01".parse().unwrap());
     let [dark, bright] = [50, 200].map(|value| Rgb::new(4, 4, vec![value; 48]).unwrap());
@@ -81,7 +81,7 @@ fn an_image_that_takes_too_much_memory_is_an_error_and_others_go_on() {
 }
 
 #[test]
-fn a_file_that_is_too_new_for_the_library_says_so() {
+fn too_new_model_is_named() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("new.onnx");
     for (versions, part) in [((99, 13), "IR version 99"), ((8, 999), "operator set 999")] {

@@ -80,7 +80,7 @@ fn numbers_of_each_type_are_given() {
 }
 
 #[test]
-fn a_number_that_does_not_fit_is_refused_with_its_type() {
+fn unsuitable_number_names_its_type() {
     let one = [Size::Known(1)];
     let rows = [
         (Type::Int, "3.5", "3.5 does not fit its type int32"),
@@ -102,7 +102,7 @@ fn a_number_that_does_not_fit_is_refused_with_its_type() {
 }
 
 #[test]
-fn a_map_and_an_expression_have_the_images_size() {
+fn map_and_expression_have_images_size() {
     let image = image(12, 20);
     let graph = onnx::times_plane("factor");
     let found = enhanced(&graph, "[extra]\nfactor = { map = 0.5 }", &image);
@@ -135,7 +135,7 @@ fn a_map_and_an_expression_have_the_images_size() {
 }
 
 #[test]
-fn noise_is_the_same_with_any_tiles_and_threads() {
+fn noise_ignores_tiles_and_threads() {
     let image = image(40, 60);
     let graph = onnx::plus_noise();
     let noise = |std: f64, seed: u64| {
@@ -168,7 +168,7 @@ fn noise_is_the_same_with_any_tiles_and_threads() {
 }
 
 #[test]
-fn noise_of_another_size_is_not_cut_into_tiles() {
+fn noise_of_other_size_is_untiled() {
     let image = image(40, 60);
     let sidecar = "tile = \"exact:2\"\n[extra]\nz = { noise = \"normal\", std = 0, divide = 8 }";
     let (_folder, enhancer) = stated(&onnx::plus_mean_of_noise(), sidecar);
@@ -183,7 +183,7 @@ fn noise_of_another_size_is_not_cut_into_tiles() {
 }
 
 #[test]
-fn a_model_of_the_luma_keeps_the_chroma() {
+fn model_of_luma_keeps_chroma() {
     let image = image(12, 20);
     let graph = onnx::luma_gain(1.5);
     let message = fault(&graph);
@@ -206,7 +206,7 @@ fn a_model_of_the_luma_keeps_the_chroma() {
 }
 
 #[test]
-fn the_image_is_composed_of_outputs_by_their_names() {
+fn outputs_compose_image_by_name() {
     let image = image(12, 20);
     let graph = onnx::light_and_reflectance();
     let light = |pixel: [f64; 3]| pixel.into_iter().fold(1e-3, f64::max);
@@ -232,7 +232,7 @@ fn the_image_is_composed_of_outputs_by_their_names() {
 }
 
 #[test]
-fn what_is_fed_and_read_are_expressions() {
+fn inputs_and_outputs_are_expressions() {
     let image = image(12, 20);
     let rows = [
         (onnx::identity(), "input = \"1 - image\""),
@@ -255,7 +255,7 @@ fn what_is_fed_and_read_are_expressions() {
 }
 
 #[test]
-fn what_is_not_finite_is_an_error() {
+fn what_is_not_finite_is_error() {
     let rows = [
         ("input = \"image / 0\"", "values that are not finite"),
         ("image = \"output / 0\"", "not numbers"),
@@ -268,7 +268,7 @@ fn what_is_not_finite_is_an_error() {
 }
 
 #[test]
-fn what_a_sidecar_lacks_is_named_with_its_lines() {
+fn missing_sidecar_lines_are_named() {
     let one = [Size::Known(1)];
     let rows = [
         (
@@ -307,7 +307,7 @@ fn what_a_sidecar_lacks_is_named_with_its_lines() {
 }
 
 #[test]
-fn a_sidecar_that_contradicts_itself_is_refused() {
+fn sidecar_that_contradicts_itself_is_refused() {
     let rows = [
         ("output = \"output\"\nimage = \"output\"", "delete `output`"),
         ("channels = \"y\"", "delete that line"),
@@ -320,7 +320,7 @@ fn a_sidecar_that_contradicts_itself_is_refused() {
 }
 
 #[test]
-fn the_command_takes_what_a_sidecar_composes() {
+fn command_takes_what_sidecar_composes() {
     let bench = Bench::new();
     onnx::light_and_reflectance().write(&bench.path(""), "pair.onnx");
     bench.file("pair.onnx.toml", "image = \"L ^ 0.2 * R\"");

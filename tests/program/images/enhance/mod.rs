@@ -93,7 +93,7 @@ fn the_runtime_is_opened_once() {
 }
 
 #[test]
-fn threads_and_enhancers_do_not_disturb_each_other() {
+fn enhancers_run_in_parallel_independently() {
     let image = image(9, 14);
     std::thread::scope(|scope| {
         for factor in [1.0_f32, 2.0, 3.0, 4.0] {
@@ -110,7 +110,7 @@ fn threads_and_enhancers_do_not_disturb_each_other() {
 }
 
 #[test]
-fn the_callers_arithmetic_keeps_its_subnormal_numbers() {
+fn callers_arithmetic_keeps_its_subnormal_numbers() {
     let (_folder, mut enhancer) = loaded(&onnx::identity());
     enhancer.enhance(&image(4, 4)).unwrap();
     let half = std::hint::black_box(f32::MIN_POSITIVE) / std::hint::black_box(2.0);

@@ -10,7 +10,7 @@ use crate::support::snapshot::redacted;
 use crate::support::table::check_rows;
 
 #[test]
-fn an_identity_gives_every_byte_back_at_any_size() {
+fn identity_returns_every_byte() {
     let (_folder, mut enhancer) = loaded(&onnx::identity());
     check_rows([(16, 16), (7, 31), (1, 1), (16, 16)], |(height, width)| {
         let image = image(height, width);
@@ -19,7 +19,7 @@ fn an_identity_gives_every_byte_back_at_any_size() {
 }
 
 #[test]
-fn gain_and_gamma_are_computed_and_held_in_range() {
+fn gain_and_gamma_stay_in_range() {
     let image = image(12, 20);
     let (_folder, mut gain) = loaded(&onnx::gain(2.2));
     assert_eq!(gain.enhance(&image).unwrap(), map(&image, |x| 2.2 * x));
@@ -31,7 +31,7 @@ fn gain_and_gamma_are_computed_and_held_in_range() {
 }
 
 #[test]
-fn of_zero_dces_three_outputs_the_second_is_the_image() {
+fn second_zero_dce_output_is_image() {
     let image = image(8, 8);
     let rows = [
         ["enhance_image_1", "enhance_image", "r"],
@@ -54,7 +54,7 @@ fn subnormal_weights_count_as_zero() {
 }
 
 #[test]
-fn external_data_is_loaded_from_beside_the_model() {
+fn external_data_beside_model_loads() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("gain.bin"), 2.0_f32.to_le_bytes()).unwrap();
     let path = onnx::external_gain("gain.bin").write(folder.path(), "model.onnx");
@@ -64,7 +64,7 @@ fn external_data_is_loaded_from_beside_the_model() {
 }
 
 #[test]
-fn every_layout_and_type_gives_every_byte_back() {
+fn every_layout_returns_every_byte() {
     let image = image(12, 20);
     let any = [Named("height"), Named("width")];
     let three = Known(3);
@@ -115,7 +115,7 @@ fn other_conventions_are_refused_by_name() {
 }
 
 #[test]
-fn what_goes_wrong_while_running_is_an_error() {
+fn runtime_failure_is_an_error() {
     let (_folder, mut halved) = loaded(&onnx::halved());
     let message = halved.enhance(&image(8, 8)).unwrap_err().to_string();
     insta::assert_snapshot!(redacted(&message), @"
@@ -136,7 +136,7 @@ fn what_goes_wrong_while_running_is_an_error() {
 }
 
 #[test]
-fn a_graph_that_the_runtime_refuses_is_an_error() {
+fn graph_that_runtime_refuses_is_error() {
     let graph = Graph::new().node("NoSuchOperator", &["input"], "output");
     insta::assert_snapshot!(redacted(&fault(&graph)), @r#"
     [TMP]/model.onnx: has an operator that is not part of ONNX; export it with standard operators only (This is an
@@ -152,7 +152,7 @@ fn a_graph_that_the_runtime_refuses_is_an_error() {
 }
 
 #[test]
-fn the_name_is_that_of_the_file() {
+fn name_is_that_of_file() {
     let (folder, enhancer) = loaded(&onnx::identity());
     let file = ModelFile::read(&folder.path().join("model.onnx")).unwrap();
     assert_eq!(enhancer.name().as_str(), "model");
@@ -192,7 +192,7 @@ fn channels_of_an_output_are_selected() {
 }
 
 #[test]
-fn a_vector_is_given_as_a_list() {
+fn vector_is_given_as_list() {
     let message = fault(&onnx::times_vector());
     insta::assert_snapshot!(redacted(&message), @r#"
     [TMP]/model.onnx: takes "alpha" (float32 [3]) in addition to the image, and its value is unknown; add to
@@ -231,14 +231,14 @@ fn halves_of_six_channels_are_named() {
 }
 
 #[test]
-fn a_number_named_output_is_no_image() {
+fn number_named_output_is_no_image() {
     let (_folder, mut enhancer) = loaded(&onnx::loss_beside());
     let image = image(12, 8);
     assert_eq!(enhancer.enhance(&image).unwrap(), image);
 }
 
 #[test]
-fn an_input_of_another_size_is_named() {
+fn input_of_another_size_is_named() {
     let message = fault(&onnx::with_embedding());
     insta::assert_snapshot!(redacted(&message), @r#"
     [TMP]/model.onnx: takes "text" (float32 [1, 77, 512]) in addition to the image, a tensor of a fixed size that

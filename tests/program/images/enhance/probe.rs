@@ -44,7 +44,7 @@ fn stated(manifest: &Value, key: &str) -> (String, String) {
 }
 
 #[test]
-fn a_right_model_is_asked_and_its_ranges_are_confirmed() {
+fn correct_model_confirms_its_ranges() {
     let bench = bench(&onnx::enhancer_in_ranges(UNIT, UNIT), "");
     let called = ask(&bench, "");
     assert_eq!(called.code, Some(0), "{called:?}");
@@ -69,7 +69,7 @@ fn a_right_model_is_asked_and_its_ranges_are_confirmed() {
 }
 
 #[test]
-fn wrong_ranges_stop_the_run_and_name_the_lines_that_mend_it() {
+fn wrong_ranges_name_the_fix() {
     for (input, output, lines) in [
         (SIGNED, SIGNED, ["-1..1", "-1..1"]),
         (BYTES, UNIT, ["0..255", "0..1"]),
@@ -100,7 +100,7 @@ fn wrong_ranges_stop_the_run_and_name_the_lines_that_mend_it() {
 }
 
 #[test]
-fn images_that_cannot_be_enhanced_ones_stop_the_run_with_what_was_seen() {
+fn impossible_enhancement_stops_the_run() {
     for (graph, seen) in [
         (onnx::blue_first(), "blue where the frames are red"),
         (onnx::negative(), "bright where the frames are dark"),
@@ -132,7 +132,7 @@ fn images_that_cannot_be_enhanced_ones_stop_the_run_with_what_was_seen() {
 }
 
 #[test]
-fn sets_for_other_tools_are_not_made_with_it_either() {
+fn export_refuses_bad_enhancer() {
     let bench = bench(&onnx::negative(), "");
     let line = "export llava rooms --out sets --llie model.onnx --levels L3 --limit 3";
     let called = bench.call(&words(line));
@@ -147,7 +147,7 @@ fn sets_for_other_tools_are_not_made_with_it_either() {
 }
 
 #[test]
-fn random_graphs_residuals_and_other_outputs_are_named() {
+fn odd_outputs_are_named() {
     for (graph, part) in [
         (onnx::noisy(), "draws random numbers (RandomNormalLike)"),
         (onnx::residual(), "`image = \"input + output\"`"),
@@ -193,7 +193,7 @@ fn a_normalised_input_is_found() {
 }
 
 #[test]
-fn mixed_ranges_are_found_by_black_and_white() {
+fn black_and_white_reveal_mixed_ranges() {
     let centred = [-0.5, 0.5];
     let clip = [
         [0.481_454_66, 0.457_827_5, 0.408_210_73],
@@ -282,7 +282,7 @@ fn a_wrong_statement_is_found_too() {
 }
 
 #[test]
-fn a_model_that_does_nothing_is_used_only_if_its_ranges_are_stated() {
+fn idle_model_needs_stated_ranges() {
     let unstated = bench(&onnx::identity(), "");
     let called = ask(&unstated, "");
     insta::assert_snapshot!(called.messages(), @r#"
@@ -307,7 +307,7 @@ fn a_model_that_does_nothing_is_used_only_if_its_ranges_are_stated() {
 
 /// With red and blue swapped, several ranges are plausible: the stated ones are kept.
 #[test]
-fn the_doctor_finds_a_wrong_order_of_colours_beside_stated_ranges() {
+fn doctor_finds_wrong_colour_order() {
     let bench = Bench::new();
     let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("models");
     fs::copy(models.join("lift.onnx"), bench.path("model.onnx")).unwrap();
@@ -334,7 +334,7 @@ fn the_doctor_finds_a_wrong_order_of_colours_beside_stated_ranges() {
 }
 
 #[test]
-fn the_doctor_proposes_a_sidecar_that_mends_the_model() {
+fn doctor_proposes_sidecar_that_mends_model() {
     for (graph, settled) in [
         (onnx::enhancer_in_ranges(SIGNED, SIGNED), true),
         (onnx::enhancer_in_ranges(BYTES, UNIT), true),

@@ -11,7 +11,7 @@ use crate::support::snapshot::redacted;
 use crate::support::table::check_rows;
 
 #[test]
-fn a_sidecar_says_which_output_it_is() {
+fn sidecar_says_which_output_it_is() {
     let graph = onnx::two_outputs();
     insta::assert_snapshot!(redacted(&fault(&graph)), @r#"
     [TMP]/model.onnx: has several outputs that could be the image: "17" (float32 [1, 3, height, width]), "18"
@@ -37,7 +37,7 @@ fn a_sidecar_says_which_output_it_is() {
 }
 
 #[test]
-fn a_sidecar_says_what_a_graph_cannot() {
+fn sidecar_says_what_graph_cannot() {
     let image = image(12, 20);
     let rows = [
         (
@@ -71,7 +71,7 @@ fn a_sidecar_says_what_a_graph_cannot() {
 }
 
 #[test]
-fn a_range_that_nobody_stated_is_checked() {
+fn range_that_nobody_stated_is_checked() {
     let rows = [
         (onnx::ranged(0.0, 255.0), "seems to be 0..255"),
         (onnx::ranged(-1.0, 1.0), "seems to be -1..1"),
@@ -84,7 +84,7 @@ fn a_range_that_nobody_stated_is_checked() {
 }
 
 #[test]
-fn a_preset_says_what_its_authors_do() {
+fn preset_says_what_its_authors_do() {
     let folder = tempfile::tempdir().unwrap();
     let path = onnx::two_outputs().write(folder.path(), "model.onnx");
     let image = image(8, 8);

@@ -33,7 +33,7 @@ fn sides_are_filled_up_to_multiples() {
 }
 
 #[test]
-fn a_row_and_a_column_are_always_filled_if_that_is_stated() {
+fn stated_row_and_column_are_padded() {
     // The mean of the whole, black fill included, shows how much was filled.
     let sidecar = "multiple = 16\npad = \"zero\"\npad_always = true";
     let (_folder, mut always) = stated(&onnx::mean_added(), sidecar);
@@ -45,7 +45,7 @@ fn a_row_and_a_column_are_always_filled_if_that_is_stated() {
 }
 
 #[test]
-fn the_smallest_multiple_is_found_by_trial_whatever_the_order_of_images() {
+fn smallest_multiple_is_found_by_trial() {
     check_rows([4, 12, 20, 48, 96], |multiple| {
         let (_folder, mut found) = loaded(&onnx::of_multiples(multiple));
         let images = [image(110, 250), image(96, 192), image(31, 97)];
@@ -113,7 +113,7 @@ fn tiles_are_exact_or_refused() {
 }
 
 #[test]
-fn large_images_may_be_enhanced_in_a_smaller_size() {
+fn large_images_enhance_at_smaller_size() {
     let (_folder, enhancer) = stated(&onnx::of_eights(), "multiple = 8");
     let mut enhancer = enhancer.with_max_side(NonZeroUsize::new(40));
     // 100 × 64 as 40 × 24: multiples of eight.

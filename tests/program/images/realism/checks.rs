@@ -19,7 +19,7 @@ fn exchange_sides(bench: &Bench, name: &str) {
 }
 
 #[test]
-fn swapped_folders_are_refused_before_any_work() {
+fn swapped_folders_are_refused_early() {
     let bench = Bench::new();
     made_pairs(&bench, "pairs", &PICTURES, &["--variant", "noise"]);
     let call = |words: &[&str]| {
@@ -55,7 +55,7 @@ fn swapped_folders_are_refused_before_any_work() {
 }
 
 #[test]
-fn a_single_swapped_pair_is_named_and_left_out() {
+fn swapped_pair_is_left_out() {
     let bench = Bench::new();
     made_pairs(&bench, "pairs", &PICTURES, &["--variant", "noise"]);
     let whole = json(&bench, &[]);
@@ -75,7 +75,7 @@ fn a_single_swapped_pair_is_named_and_left_out() {
 }
 
 #[test]
-fn images_of_two_scenes_are_named_and_left_out() {
+fn pair_of_two_scenes_left_out() {
     let bench = Bench::new();
     made_pairs(&bench, "pairs", &PICTURES, &["--variant", "noise"]);
     exchange(&bench, "pairs/low/a.png", "pairs/low/c.png");
@@ -102,7 +102,7 @@ fn images_of_two_scenes_are_named_and_left_out() {
 }
 
 #[test]
-fn a_pair_of_nearly_the_same_light_is_warned_about() {
+fn pair_of_similar_light_warns() {
     let bench = Bench::new();
     pair(&bench, "a", 1);
     let normal = bench.path("pairs/normal/a.png");

@@ -22,7 +22,7 @@ fn fits<'s>(summary: &'s Value, reading: &str) -> &'s [Value] {
 }
 
 #[test]
-fn a_known_gain_comes_back_in_every_light_reading() {
+fn known_gain_fits_every_profile() {
     check_rows(["paper", "eld", "level", "physical"], |reading| {
         let bench = Bench::new();
         for (name, gain) in [("weak", "0.2"), ("middle", "0.7746"), ("strong", "3")] {
@@ -49,7 +49,7 @@ fn a_known_gain_comes_back_in_every_light_reading() {
 
 /// A picture that holds linear light is fitted as light, as it is compared: its noise is not that of a picture of its codes.
 #[test]
-fn a_known_gain_comes_back_from_linear_light() {
+fn known_gain_fits_linear_light() {
     let bench = Bench::new();
     for side in ["normal", "low"] {
         fs::create_dir_all(bench.path(&format!("pairs/{side}"))).unwrap();
@@ -86,7 +86,7 @@ fn a_known_gain_comes_back_from_linear_light() {
 
 /// A picture without noise, and one whose noise was averaged away: the one has no gain, the other a smaller one.
 #[test]
-fn what_is_not_the_noise_of_a_sensor_is_not_fitted() {
+fn foreign_noise_is_not_fitted() {
     let bench = Bench::new();
     made_pairs(&bench, "pairs", &[("bare", 4)], &["--variant", "ev"]);
     let loud = [&FIXED[..], &["--gain", "3", "--profile", "physical"]].concat();
@@ -160,7 +160,7 @@ fn of_pair(bench: &Bench, file: &str, pair: &str, camera: &str) -> Vec<String> {
 
 /// With three fitted pairs, a pair is judged by the camera that the other two alone give; not by one that knows its own gain.
 #[test]
-fn no_pair_is_judged_by_its_own_gain() {
+fn pairs_are_judged_by_others_gain() {
     let bench = Bench::new();
     let others = [("one", 4), ("two", 5)];
     unequal_pairs(&bench, "others", &others);
@@ -194,7 +194,7 @@ fn no_pair_is_judged_by_its_own_gain() {
 }
 
 #[test]
-fn the_fitted_camera_is_read_again_and_gives_the_same_numbers() {
+fn fitted_camera_reproduces_numbers() {
     let bench = Bench::new();
     unequal_pairs(&bench, "pairs", &[("one", 4), ("loud", 5)]);
     let fit = [
@@ -240,7 +240,7 @@ fn the_fitted_camera_is_read_again_and_gives_the_same_numbers() {
 }
 
 #[test]
-fn fits_do_not_depend_on_threads_but_on_the_seed() {
+fn fits_depend_only_on_seed() {
     let bench = Bench::new();
     unequal_pairs(&bench, "pairs", &[("one", 4), ("loud", 5)]);
     let fit = |words: &[&str]| json(&bench, &[&["--fit", "--profile", "all"], words].concat());
@@ -257,7 +257,7 @@ fn fits_do_not_depend_on_threads_but_on_the_seed() {
 }
 
 #[test]
-fn a_gain_is_not_both_pinned_and_fitted() {
+fn gain_is_pinned_or_fitted() {
     let bench = Bench::new();
     pair(&bench, "a", 1);
     let refused = bench.call(&["realism", "pairs", "--fit", "--gain", "1"]);

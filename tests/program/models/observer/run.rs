@@ -26,7 +26,7 @@ fn by_key(run: &Path) -> BTreeMap<String, Value> {
 }
 
 #[test]
-fn it_is_asked_with_the_image_of_another_scene_too() {
+fn control_sees_another_scene() {
     let bench = Bench::new();
     bench.rooms("frames", 6, "160x120");
     let table = bench.complete(&words(&format!("{RUN} --out run --full")));
@@ -122,7 +122,7 @@ fn parts_and_interruptions_change_nothing() {
 }
 
 #[test]
-fn with_one_scene_the_control_is_shown_the_tiles_in_another_order() {
+fn single_scene_control_shuffles_tiles() {
     let bench = Bench::new();
     let line = "--model observer --data rooms:frames=2,size=160x120 --levels L0 --out run";
     let called = bench.call(&words(line));
@@ -178,7 +178,7 @@ fn with_one_scene_the_control_is_shown_the_tiles_in_another_order() {
 }
 
 #[test]
-fn the_rules_make_the_questions_and_the_answers_alike() {
+fn rules_make_questions_and_answers_alike() {
     let bench = Bench::new();
     bench.rooms("frames", 6, "160x120");
     let rules = include_str!("../../../../src/questions/src/rules.toml");
@@ -210,7 +210,7 @@ fn the_rules_make_the_questions_and_the_answers_alike() {
 }
 
 #[test]
-fn a_control_that_is_not_at_chance_hides_the_observer() {
+fn biased_control_hides_observer() {
     let bench = Bench::new();
     bench.rooms("frames", 6, "160x120");
     bench.complete(&words(&format!("{RUN} --model random --out run")));

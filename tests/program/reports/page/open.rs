@@ -9,7 +9,7 @@ use crate::support::house::House;
 use crate::support::snapshot::redacted;
 
 #[test]
-fn the_page_of_open_questions_works_in_a_browser() {
+fn open_page_works_in_browser() {
     let Some(mut browser) = browser() else {
         return;
     };

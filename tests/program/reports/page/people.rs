@@ -56,7 +56,7 @@ fn people_can_answer() {
 }
 
 #[test]
-fn people_can_answer_in_their_own_words() {
+fn people_may_answer_freely() {
     let Some(mut browser) = browser() else {
         return;
     };

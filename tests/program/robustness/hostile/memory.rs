@@ -50,7 +50,7 @@ fn reply(field: &str, value: &str) -> Vec<u8> {
 }
 
 #[test]
-fn replies_of_many_small_values_are_read() {
+fn nested_small_values_are_read() {
     let bench = Bench::with_questions(1);
     let error = |count: usize| {
         let details = "{\"a\":1},".repeat(count);
@@ -83,7 +83,7 @@ fn replies_of_many_small_values_are_read() {
 }
 
 #[test]
-fn a_record_keeps_both_ends_of_a_long_reply() {
+fn record_keeps_ends_of_long_reply() {
     let bench = Bench::with_questions(1);
     let long = format!("I look. {}The answer is (C).", "Hm. ".repeat(1 << 20));
     let mock = MockEndpoint::answering(move |_| Answer::text(&long));
@@ -124,7 +124,7 @@ fn parquet(rows: usize) -> Vec<u8> {
 }
 
 #[test]
-fn sets_of_too_many_rows_are_refused() {
+fn oversized_sets_are_refused() {
     let bench = Bench::with_questions(1);
     bench.file("small.parquet", parquet(1));
     let large = parquet(1_500_000);
@@ -156,7 +156,7 @@ fn sets_of_too_many_rows_are_refused() {
 }
 
 #[test]
-fn archives_of_too_many_entries_are_refused() {
+fn oversized_archives_are_refused() {
     let bench = Bench::with_questions(1);
     // Entries of the directory alone, then its end; the number of them is in the record of the 64-bit form.
     let (count, entry) = (1_200_000_u64, {
@@ -245,7 +245,7 @@ fn sparse_files_are_not_read() {
 }
 
 #[test]
-fn a_run_of_many_models_is_reported_without_their_pairs() {
+fn many_models_are_reported_without_pairs() {
     let bench = Bench::with_questions(2);
     let line = "--model random --data set.jsonl --levels L0,L3 --no-parquet --out run";
     assert_eq!(call(&bench, line).code, Some(0));
@@ -275,7 +275,7 @@ fn a_run_of_many_models_is_reported_without_their_pairs() {
 }
 
 #[test]
-fn a_model_that_takes_too_long_to_load_is_refused() {
+fn slow_loading_model_is_refused() {
     let bench = Bench::with_questions(1);
     onnx::slow_to_load().write(&bench.path(""), "slow.onnx");
     onnx::gain(0.5).write(&bench.path(""), "quick.onnx");

@@ -14,7 +14,7 @@ use crate::support::snapshot::lines_with;
 use crate::support::table::check_rows;
 
 #[test]
-fn the_built_in_rooms_run_without_anything() {
+fn built_in_rooms_run_without_anything() {
     let bench = Bench::new();
     let args = words("--model observer --blind-model observer --out run --full");
     let table = bench.complete(&args);
@@ -120,7 +120,7 @@ fn threads_and_order_change_no_byte() {
 }
 
 #[test]
-fn several_images_enhanced_at_once_are_the_same_images() {
+fn parallel_enhancement_keeps_images() {
     let bench = Bench::new();
     bench.rooms("frames", 8, "160x96");
     let images = |run: &str, threads: &str| -> BTreeMap<String, String> {
@@ -216,7 +216,7 @@ fn ready_made_sets_are_read() {
 }
 
 #[test]
-fn two_scripts_that_say_the_same_are_two_models() {
+fn equal_scripts_are_two_models() {
     let bench = Bench::with_frames();
     for script in ["one.jsonl", "two.jsonl"] {
         bench.file(script, "{\"default\":\"A\"}\n");

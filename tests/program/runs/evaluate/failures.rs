@@ -13,7 +13,7 @@ use crate::support::run::{Bench, model_args, records, words};
 use crate::support::table::check_rows;
 
 #[test]
-fn a_broken_image_is_found_before_anything_is_asked() {
+fn broken_image_is_found_early() {
     let bench = Bench::with_frames();
     let whole = png(20);
     let endpoint = MockEndpoint::start([Answer::text("A")]);
@@ -38,7 +38,7 @@ fn a_broken_image_is_found_before_anything_is_asked() {
 }
 
 #[test]
-fn a_folder_that_cannot_be_written_is_found_before_the_data_are_read() {
+fn unwritable_folder_is_found_early() {
     let bench = Bench::new();
     bench.file("file", "");
     let rows = [
@@ -58,7 +58,7 @@ fn a_folder_that_cannot_be_written_is_found_before_the_data_are_read() {
 }
 
 #[test]
-fn a_model_that_does_not_exist_stops_itself_alone() {
+fn unknown_model_stops_alone() {
     let bench = Bench::with_frames();
     let endpoint = MockEndpoint::start([Answer::error(404, "model_not_found", "no such model")]);
     let url = endpoint.base_url();
@@ -79,7 +79,7 @@ fn a_model_that_does_not_exist_stops_itself_alone() {
 }
 
 #[test]
-fn an_endpoint_that_is_not_there_is_noticed_by_its_first_failures() {
+fn missing_endpoint_is_noticed_soon() {
     let bench = Bench::with_frames();
     let free = std::net::TcpListener::bind("127.0.0.1:0")
         .unwrap()
@@ -99,7 +99,7 @@ fn an_endpoint_that_is_not_there_is_noticed_by_its_first_failures() {
 }
 
 #[test]
-fn an_image_that_changes_under_way_is_not_taken_for_the_old_one() {
+fn changed_image_is_not_mixed() {
     let bench = Bench::with_frames();
     let later = Answer::error(429, "slow_down", "later").header("retry-after", "1");
     let endpoint = MockEndpoint::start([later, Answer::text("A")]);
@@ -126,7 +126,7 @@ fn an_image_that_changes_under_way_is_not_taken_for_the_old_one() {
 }
 
 #[test]
-fn an_enhancer_that_fails_is_found_before_anything_is_asked() {
+fn failing_enhancer_is_found_early() {
     let bench = Bench::with_frames();
     onnx::not_a_number().write(&bench.path(""), "nan.onnx");
     let endpoint = MockEndpoint::start([Answer::text("A")]);

@@ -35,7 +35,7 @@ fn an_interrupt_keeps_what_was_answered() {
 
 /// A batch system sends one SIGTERM, and kills some time later: what came is written before that.
 #[test]
-fn an_interrupt_gives_up_after_the_grace_what_is_never_answered() {
+fn interrupt_abandons_requests_after_grace() {
     let bench = Bench::with_frames();
     let endpoint = MockEndpoint::start([Answer::text("A"), Answer::silent()]);
     let url = endpoint.base_url();
@@ -81,7 +81,7 @@ fn an_interrupt_gives_up_after_the_grace_what_is_never_answered() {
 }
 
 #[test]
-fn an_interrupt_does_not_wait_for_retries() {
+fn interrupt_does_not_wait_for_retries() {
     let bench = Bench::with_frames();
     let later = Answer::error(429, "slow_down", "later").header("retry-after", "100");
     let endpoint = MockEndpoint::start([Answer::text("A"), later]);
@@ -118,7 +118,7 @@ fn an_interrupt_does_not_wait_for_retries() {
 
 /// A closed terminal asks to stop, as SIGTERM does; under `nohup` it does not.
 #[test]
-fn a_closed_terminal_interrupts_unless_it_is_ignored() {
+fn closed_terminal_interrupts_unless_ignored() {
     let bench = Bench::with_frames();
     let endpoint = MockEndpoint::answering(|_| {
         thread::sleep(Duration::from_millis(300));

@@ -11,7 +11,7 @@ use crate::support::snapshot::lines_with;
 use crate::support::table::check_rows;
 
 #[test]
-fn a_record_and_a_row_keep_the_contract() {
+fn record_and_row_keep_contract() {
     let bench = Bench::with_frames();
     bench.file("script.jsonl", "{\"question\":\"a1\",\"reply\":\"No.\"}\n{\"question\":\"b1\",\"condition\":\"L1-ev\",\"reply\":\"too dark to see\"}\n{\"default\":\"**A**\"}\n");
     let table = bench.complete(&words(
@@ -116,7 +116,7 @@ fn json_is_the_summary() {
 
 /// A router names the provider that it passed a request on to: kept in the record, and said if there are several.
 #[test]
-fn the_providers_of_a_router_are_kept_and_counted() {
+fn router_providers_are_counted() {
     let reply = |provider: &str| {
         let message = json!({"role": "assistant", "content": "A"});
         Answer::json(

@@ -37,7 +37,7 @@ fn kept(mock: &MockEndpoint, args: &str) -> Vec<Value> {
 }
 
 #[test]
-fn the_probability_of_each_choice_is_kept() {
+fn probability_of_each_choice_is_kept() {
     let mock = MockEndpoint::start([Answer::json(200, &sure())]);
     for record in kept(&mock, ASKED) {
         let options = &record["options"];
@@ -68,7 +68,7 @@ fn the_probability_of_each_choice_is_kept() {
 
 /// Replies that say nothing of the choices: the answer is read as ever.
 #[test]
-fn what_a_server_does_not_state_is_not_made_up() {
+fn unstated_probabilities_are_not_invented() {
     let without = |logprobs: Value| {
         let mut body = sure();
         body["choices"][0]["logprobs"] = logprobs;
@@ -97,7 +97,7 @@ fn what_a_server_does_not_state_is_not_made_up() {
 }
 
 #[test]
-fn a_server_without_probabilities_is_asked_without_them() {
+fn probabilities_are_dropped_if_unsupported() {
     let mock = MockEndpoint::answering(|body| match body.get("logprobs") {
         Some(_) => Answer::error(
             400,

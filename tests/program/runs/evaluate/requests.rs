@@ -11,7 +11,7 @@ use crate::support::run::{Bench, called, files, model_args, records, words};
 use crate::support::snapshot::lines_with;
 
 #[test]
-fn words_are_the_same_bytes_in_every_condition() {
+fn words_are_equal_in_all_conditions() {
     let bench = Bench::with_frames();
     let endpoint = MockEndpoint::start([Answer::text("A")]);
     let url = endpoint.base_url();

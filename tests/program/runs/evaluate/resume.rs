@@ -10,7 +10,7 @@ use crate::support::snapshot::{lines_with, redacted};
 use crate::support::table::check_rows;
 
 #[test]
-fn a_stopped_run_goes_on_where_it_stopped() {
+fn stopped_run_resumes() {
     let bench = Bench::with_frames();
     let answers = std::iter::repeat_n(Answer::text("A"), 4)
         .chain([Answer::error(401, "invalid_api_key", "no such key")])
@@ -49,7 +49,7 @@ fn a_stopped_run_goes_on_where_it_stopped() {
 }
 
 #[test]
-fn a_mistyped_address_without_a_reply_binds_the_run_to_nothing() {
+fn mistyped_address_does_not_bind_run() {
     let bench = Bench::with_frames();
     let line = "--data frames --levels L0 --retries 0 --out run";
     let wrong = bench.call(&model_args("http://127.0.0.1:9/v1", line));
@@ -73,7 +73,7 @@ fn a_mistyped_address_without_a_reply_binds_the_run_to_nothing() {
 }
 
 #[test]
-fn a_torn_record_is_asked_again_and_nothing_else() {
+fn only_torn_record_is_repeated() {
     let bench = Bench::with_frames();
     let endpoint = MockEndpoint::start([Answer::text("A")]);
     let url = endpoint.base_url();
@@ -95,7 +95,7 @@ fn a_torn_record_is_asked_again_and_nothing_else() {
 }
 
 #[test]
-fn failed_trials_are_counted_apart_and_asked_again() {
+fn failed_trials_are_counted_and_repeated() {
     let bench = Bench::with_frames();
     let broken = Answer::error(400, "bad_image", "cannot look at this");
     let endpoint = MockEndpoint::start([Answer::text("B"), broken, Answer::text("A")]);
@@ -125,7 +125,7 @@ fn failed_trials_are_counted_apart_and_asked_again() {
 }
 
 #[test]
-fn another_configuration_on_the_same_folder_is_refused() {
+fn other_configuration_is_refused() {
     let bench = Bench::new();
     let args = words("--model random --levels L0 --out run");
     bench.complete(&args);
@@ -141,7 +141,7 @@ fn another_configuration_on_the_same_folder_is_refused() {
 }
 
 #[test]
-fn kept_replies_are_read_as_new_ones() {
+fn stored_replies_parse_like_new() {
     let bench = Bench::with_frames();
     bench.file("script.jsonl", "{\"default\":\"A\"}\n");
     let args = words("--data frames --model script:script.jsonl --levels L0 --out run");
@@ -168,7 +168,7 @@ fn showing_a_complete_run_changes_nothing() {
 }
 
 #[test]
-fn a_dry_run_refuses_what_the_run_refuses() {
+fn dry_run_refuses_what_run_refuses() {
     let bench = Bench::with_frames();
     let line = "--model random --data frames --levels L0,L3 --out run";
     bench.complete(&words(line));

@@ -72,7 +72,7 @@ fn mean(image: &image::RgbImage) -> f64 {
 }
 
 #[test]
-fn dark_photographs_are_asked_as_they_are_and_enhanced() {
+fn dark_photographs_are_asked_and_enhanced() {
     let bench = photos(40);
     let called = bench.call(&words(&format!("{ASK} --levels L0 --llie-on l0")));
     assert_eq!(called.code, Some(0), "{called:?}");
@@ -162,7 +162,7 @@ fn a_row_holds_one_treatment() {
 }
 
 #[test]
-fn the_report_has_the_untouched_images_enhanced() {
+fn report_has_untouched_images_enhanced() {
     let bench = photos(220);
     let full = format!("{ASK} --levels L0,L3 --llie-on all --full");
     let table = bench.complete(&words(&full));
@@ -199,7 +199,7 @@ fn the_report_has_the_untouched_images_enhanced() {
 }
 
 #[test]
-fn an_enhancer_without_an_image_is_an_error() {
+fn enhancer_without_image_is_error() {
     let bench = photos(220);
     let only = "the enhancer would never be used: only L0 is asked; --llie-on l0 enhances the untouched images";
     let rows = [
@@ -243,7 +243,7 @@ fn an_enhancer_without_an_image_is_an_error() {
 }
 
 #[test]
-fn the_estimate_counts_the_untouched_images_enhanced() {
+fn estimate_counts_untouched_images_enhanced() {
     let bench = photos(220);
     let rows = [("noise", 12), ("l0,noise", 15), ("all", 18)];
     // Three questions about three images in L0, L3-ev, L3-noise and the enhanced ones.
@@ -308,7 +308,7 @@ fn dark_images_are_noticed_once() {
 }
 
 #[test]
-fn open_questions_are_asked_about_untouched_images_enhanced() {
+fn open_questions_cover_untouched_enhanced() {
     let house = House::new();
     onnx::gain(2.0).write(&house.0.path(""), "bright.onnx");
     house.0.file("a.jsonl", "{\"default\": \"an answer\"}");

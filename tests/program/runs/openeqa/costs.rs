@@ -7,7 +7,7 @@ use crate::support::house::House;
 use crate::support::run::{called, words};
 
 #[test]
-fn a_dry_run_says_what_it_would_take_and_sends_nothing() {
+fn open_dry_run_sends_nothing() {
     let house = House::new();
     let silent = MockEndpoint::start([Answer::error(400, "bad", "must not be asked")]);
     let base = silent.base_url();
@@ -58,7 +58,7 @@ fn a_dry_run_says_what_it_would_take_and_sends_nothing() {
 }
 
 #[test]
-fn a_budget_holds_for_answers_and_marks_together() {
+fn budget_covers_answers_and_marks() {
     let house = House::new();
     let usage = json!({"prompt_tokens": 100_000, "completion_tokens": 10});
     let body = json!({"choices": [{"message": {"content": "5"}, "finish_reason": "stop"}], "usage": usage});
@@ -80,7 +80,7 @@ fn a_budget_holds_for_answers_and_marks_together() {
 }
 
 #[test]
-fn the_answers_of_a_model_of_a_file_count_against_the_budget_of_marks() {
+fn file_model_cost_counts_for_marks() {
     let house = House::new();
     let usage = json!({"prompt_tokens": 100_000, "completion_tokens": 10});
     let body = json!({"choices": [{"message": {"content": "5"}, "finish_reason": "stop"}], "usage": usage});
@@ -99,7 +99,7 @@ fn the_answers_of_a_model_of_a_file_count_against_the_budget_of_marks() {
 
 /// Groq takes 5 images in a request: said by the estimate, and refused before anything is sent. A blind model is shown none.
 #[test]
-fn more_images_than_a_vendor_takes_are_refused() {
+fn excess_images_per_vendor_are_refused() {
     let house = House::new();
     let call = |frames: &str, more: &str| {
         let line = format!(

@@ -75,7 +75,7 @@ fn marks_come_to_upstreams_score() {
 
 /// OpenEQA itself asks four questions more than once.
 #[test]
-fn the_same_answer_to_the_same_words_is_marked_once_and_scored_in_each_walk() {
+fn equal_answers_are_marked_once() {
     let house = House::new();
     let mut questions = house.read("questions.json");
     let twin = |id: &str, category: &str, extra: Value| json!({"question_id": id, "question": "What colour is it?", "answer": "brown", "category": category, "episode_history": "scannet-v0/001-b", "extra_answers": extra});
@@ -113,7 +113,7 @@ fn the_same_answer_to_the_same_words_is_marked_once_and_scored_in_each_walk() {
 }
 
 #[test]
-fn what_is_missing_is_named_and_counted_and_nothing_is_lost() {
+fn missing_answers_are_counted() {
     let house = House::new();
     fs::remove_dir_all(house.0.path("walks/scannet-v0")).unwrap();
     house.0.file("a.jsonl", "{\"default\": \"an answer\"}");
@@ -186,7 +186,7 @@ fn what_is_missing_is_named_and_counted_and_nothing_is_lost() {
 }
 
 #[test]
-fn a_model_that_is_gone_keeps_nobody_elses_answers_from_their_marks() {
+fn lost_model_does_not_block_marks() {
     let house = House::new();
     let mock = MockEndpoint::answering(|request| {
         if request["model"] == "gone" {
@@ -216,7 +216,7 @@ fn a_model_that_is_gone_keeps_nobody_elses_answers_from_their_marks() {
 }
 
 #[test]
-fn people_get_a_page_without_the_answers_and_their_file_is_marked() {
+fn study_page_hides_answers() {
     let house = House::new();
     let called = house.call(&["--study", "study", "--levels", "L0,L4"]);
     insta::assert_snapshot!(called, @"
@@ -251,7 +251,7 @@ fn thinking_judge() -> MockEndpoint {
 }
 
 #[test]
-fn truncated_marks_are_asked_again_with_a_larger_limit() {
+fn larger_limit_repeats_truncated_marks() {
     let house = House::new();
     let people = json!([
         {"question_id": "q1", "answer": "brown"},

@@ -94,7 +94,7 @@ fn check_judge_prompts(requests: &[Value]) {
 }
 
 #[test]
-fn every_prompt_is_upstreams_byte_for_byte() {
+fn prompts_match_upstream() {
     let house = House::new();
     let model = MockEndpoint::start([
         Answer::text("It's brown. It may"),
@@ -135,7 +135,7 @@ fn every_prompt_is_upstreams_byte_for_byte() {
 }
 
 #[test]
-fn blind_models_are_asked_and_read_as_upstream_does() {
+fn blind_models_follow_upstream() {
     let house = House::new();
     let model = MockEndpoint::start([
         Answer::text("A: a bed\nExplanation: x"),

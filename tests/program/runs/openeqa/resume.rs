@@ -10,7 +10,7 @@ use crate::support::house::House;
 use crate::support::run::{model_args, records, words};
 
 #[test]
-fn nothing_is_asked_twice_and_what_was_out_in_a_batch_is_taken_over() {
+fn batch_replies_are_imported_on_resume() {
     let house = House::new();
     let silent = MockEndpoint::start([Answer::error(400, "bad", "must not be asked")]);
     let base = silent.base_url();
@@ -92,7 +92,7 @@ fn nothing_is_asked_twice_and_what_was_out_in_a_batch_is_taken_over() {
 }
 
 #[test]
-fn a_run_goes_on_where_it_was_stopped() {
+fn stopped_open_run_resumes() {
     let house = House::new();
     let refused = Answer::error(401, "invalid_api_key", "no");
     let model = MockEndpoint::start([Answer::text("one"), refused]);

@@ -11,7 +11,7 @@ use crate::support::house::{House, flags};
 use crate::support::run::{called, model_args, records, words};
 
 #[test]
-fn a_broken_frame_takes_its_walk_out_alone() {
+fn broken_frame_removes_only_walk() {
     let house = House::new();
     house
         .0
@@ -40,7 +40,7 @@ fn a_broken_frame_takes_its_walk_out_alone() {
 }
 
 #[test]
-fn one_camera_takes_a_walk_and_the_frames_are_the_same_at_every_level() {
+fn walk_has_one_camera() {
     let house = House::new();
     let model = MockEndpoint::start([Answer::text("x")]);
     let base = model.base_url();
@@ -80,7 +80,7 @@ fn one_camera_takes_a_walk_and_the_frames_are_the_same_at_every_level() {
 }
 
 #[test]
-fn the_only_frame_of_a_walk_is_shown_as_often_as_frames_are_asked_for() {
+fn single_frame_is_repeated() {
     let house = House::new();
     fs::remove_file(house.0.path("walks/scannet-v0/001-b/00001-rgb.png")).unwrap();
     let mock = MockEndpoint::start([Answer::text("an answer")]);
@@ -101,7 +101,7 @@ fn the_only_frame_of_a_walk_is_shown_as_often_as_frames_are_asked_for() {
 }
 
 #[test]
-fn a_task_of_an_array_asks_about_walks_of_its_own() {
+fn array_task_asks_own_walks() {
     let house = House::new();
     house.0.file("a.jsonl", "{\"default\": \"an answer\"}");
     let args = flags(&words("--model script:a.jsonl --levels L0 --out run"));
