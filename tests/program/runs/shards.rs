@@ -193,10 +193,9 @@ fn doubly_paid_replies_are_reported() {
     bench.complete(&words(&format!("{flags} --out one --shard 2/2")));
     let merged = bench.call(&words("merge one two --out merged"));
     assert_eq!(merged.code, Some(0), "{merged:?}");
-    insta::assert_snapshot!(merged.messages(), @"
-    exit code: 0
-     WARN 33 replies differ in two parts: they were paid for twice; those of the first part are taken
-    ");
+    // How many depends on the order of the replies.
+    let said = "replies differ in two parts: they were paid for twice";
+    assert!(merged.stderr.contains(said), "{}", merged.stderr);
     let first = bench.call(&words("merge one --out first"));
     assert_eq!(first.code, Some(0), "{first:?}");
     assert_same_products(&bench.path("first"), &bench.path("merged"));

@@ -295,7 +295,7 @@ fn unanswered_replies_show_their_reason() {
     insta::assert_snapshot!(called.lines_with("token limit"), @"
     exit code: 0
     of the unparsed replies 10 cut at the token limit (--max-tokens), 1 refused, 1 withheld by a filter
-     WARN 10 of the first 10 replies were cut at the token limit before any text: a reasoning model needs a larger
+    WARN 10 of the first 10 replies were cut at the token limit before any text: a reasoning model needs a larger
         --max-tokens, or a lower --reasoning-effort
     ");
     insta::assert_snapshot!(called.messages(), @"
