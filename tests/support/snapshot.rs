@@ -90,6 +90,19 @@ pub fn lines_with(text: &str, part: &str) -> String {
     }
 }
 
+/// Every row of a table, and below each what came of it.
+pub fn each<T: Display>(
+    rows: impl IntoIterator<Item = T>,
+    mut text: impl FnMut(&T) -> String,
+) -> String {
+    let mut all = String::new();
+    for row in rows {
+        let name = row.to_string().trim_end().replace('\n', " \\n ");
+        all.push_str(&format!("{name}\n  {}\n", text(&row).replace('\n', "\n  ")));
+    }
+    all
+}
+
 /// A line in pieces of at most `WIDTH` characters, split at spaces.
 fn wrapped(line: &str) -> String {
     let mut out = String::new();

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use crate::support::endpoint::{Answer, MockEndpoint, Request};
 use crate::support::house::House;
 use crate::support::run::{Bench, Called, called, files, model_args, records, words};
-use crate::support::snapshot::redacted;
+use crate::support::snapshot::{each, redacted};
 
 /// A folder with questions and this file of models.
 fn bench(questions: usize, models: &str) -> Bench {
@@ -142,7 +142,7 @@ id = "random"
     assert_eq!(models[1]["headers"], json!(["X-Team", "X-Auth"]));
     insta::assert_snapshot!(run.lines_with("First"), @"
     exit code: 0
-     First       0.0   0.0 +56.1
+    First       0.0   0.0 +56.1
     ");
     for file in files(&bench.path("run")) {
         let text = String::from_utf8_lossy(&fs::read(&file).unwrap()).into_owned();
@@ -201,30 +201,59 @@ fn file_errors_name_their_line() {
     let table = |line: &str| {
         format!("[[model]]\nid = \"m\"\nendpoints = [\"http://127.0.0.1:9/v1\"]\n{line}\n")
     };
-    for (line, part) in [
-        (
-            "max-token = 3",
-            "line 4: there is no key max-token; did you mean max-tokens?",
-        ),
-        ("base-url = \"a\"", "did you mean endpoints?"),
-        ("api_key = \"a\"", "did you mean key-env?"),
-        ("model = \"a\"", "did you mean id?"),
-        ("qqqq = 3", "line 4: there is no key qqqq\n"),
-        ("rpm = \"many\"", "line 4: rpm: invalid value 'many'"),
-        ("temperature = \"hot\"", "line 4: temperature: "),
-        ("view = \"both eyes\"", "image, blind or both"),
-        ("price = { input = 1 }", "line 4: price: "),
-        ("limit = 0", "line 4: limit: "),
-        ("headers = { X-A = 3 }", "line 4: headers: "),
-        ("body = { temperature = 1 }", "use --temperature"),
-        ("max-side = 300", "set it in [defaults], or use --max-side"),
-        ("name = \"\"", "line 4: name: a text expected"),
-        ("key-env = \"NOWHERE_KEY\"", "NOWHERE_KEY is not set"),
-    ] {
-        let error = refusal(&table(line), "");
-        assert!(error.contains(part), "{line}: {error}");
-        assert!(error.contains("models.toml, line"), "{line}: {error}");
-    }
+    let lines = [
+        "max-token = 3",
+        "base-url = \"a\"",
+        "api_key = \"a\"",
+        "model = \"a\"",
+        "qqqq = 3",
+        "rpm = \"many\"",
+        "temperature = \"hot\"",
+        "view = \"both eyes\"",
+        "price = { input = 1 }",
+        "limit = 0",
+        "headers = { X-A = 3 }",
+        "body = { temperature = 1 }",
+        "max-side = 300",
+        "name = \"\"",
+        "key-env = \"NOWHERE_KEY\"",
+    ];
+    let errors = each(lines, |line| redacted(&refusal(&table(line), "")));
+    insta::assert_snapshot!(errors, @r#"
+    max-token = 3
+      error: models.toml, line 4: there is no key max-token; did you mean max-tokens?
+    base-url = "a"
+      error: models.toml, line 4: there is no key base-url; did you mean endpoints?
+    api_key = "a"
+      error: models.toml, line 4: there is no key api-key; did you mean key-env?
+    model = "a"
+      error: models.toml, line 4: there is no key model; did you mean id?
+    qqqq = 3
+      error: models.toml, line 4: there is no key qqqq
+    rpm = "many"
+      error: models.toml, line 4: rpm: invalid value 'many' for '--rpm <N>': invalid digit found in string
+    temperature = "hot"
+      error: models.toml, line 4: temperature: invalid value 'hot' for '--temperature <T|auto|default>': a number
+          from 0 on, auto or default expected
+    view = "both eyes"
+      error: models.toml, line 4: view: image, blind or both expected
+    price = { input = 1 }
+      error: models.toml, line 4: price: missing field `output`; { input = 2.5, output = 10 } expected, dollars per
+          million tokens
+    limit = 0
+      error: models.toml, line 4: limit: a whole number from 1 on expected
+    headers = { X-A = 3 }
+      error: models.toml, line 4: headers: { NAME = "value", NAME = { env = "VARIABLE" } } expected
+    body = { temperature = 1 }
+      error: models.toml, line 2: m: --extra-body: temperature is set by the program: use --temperature
+    max-side = 300
+      error: models.toml, line 4: max-side applies to all models, because each image is made once: set it in
+          [defaults], or use --max-side
+    name = ""
+      error: models.toml, line 4: name: a text expected
+    key-env = "NOWHERE_KEY"
+      error: models.toml, line 2: m: --api-key-env: the variable NOWHERE_KEY is not set
+    "#);
     let error = refusal("[defaults]\nid = \"m\"\n[[model]]\nid = \"random\"", "");
     insta::assert_snapshot!(redacted(&error), @"error: models.toml, line 2: id belongs to one model: it cannot be in [defaults]");
     let error = refusal("[[model]]\nname = \"m\"", "");
@@ -236,15 +265,23 @@ fn file_errors_name_their_line() {
         secret.contains("line 4") && !secret.contains("0123"),
         "{secret}"
     );
-    for (line, part) in [
-        ("--set n.rpm=3", "the models are m"),
-        ("--set m.rpms=3", "did you mean rpm?"),
-        ("--set m.id=n", "cannot be set"),
-        ("--only n", "the models are m"),
-    ] {
-        let error = refusal(&table(""), line);
-        assert!(error.contains(part), "{line}: {error}");
-    }
+    let flags = [
+        "--set n.rpm=3",
+        "--set m.rpms=3",
+        "--set m.id=n",
+        "--only n",
+    ];
+    let errors = each(flags, |flag| redacted(&refusal(&table(""), flag)));
+    insta::assert_snapshot!(errors, @"
+    --set n.rpm=3
+      error: --set: n.rpm: no model of this name; the models are m
+    --set m.rpms=3
+      error: --set: there is no key rpms; did you mean rpm?
+    --set m.id=n
+      error: --set: id identifies the model, and cannot be set
+    --only n
+      error: --only: n: no model of this name; the models are m
+    ");
 }
 
 #[test]
