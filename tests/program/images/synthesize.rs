@@ -4,6 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use crate::support::run::{Bench, words};
+use crate::support::snapshot::each;
 use crate::support::table::check_rows;
 use serde_json::{Value, json};
 
@@ -314,31 +315,41 @@ fn senseless_calls_get_one_line() {
     frames(&bench);
     fs::copy(bench.path("frames/a.png"), bench.path("frames/a.PNG")).unwrap();
     bench.file("my.toml", "name = \"mine\"\nadu-range = nan\n");
-    let cases: [(&[&str], &str); 6] = [
-        (&["frames"], "would both be written as a;"),
-        (&["none"], "none"),
-        (&["frames/a.png", "--camera", "my.toml"], "my.toml"),
-        (
-            &["frames/a.png", "--sheet", "all"],
-            "'--sheet <SHEET>' [possible values: levels, noise]",
-        ),
-        (&["frames/a.png", "--from", "my.toml"], "my.toml"),
-        (
-            &["frames/a.png", "--coupling", "photon", "--ratio", "4"],
-            "--noise ratio",
-        ),
+    let calls = [
+        "frames",
+        "none",
+        "frames/a.png --camera my.toml",
+        "frames/a.png --sheet all",
+        "frames/a.png --from my.toml",
+        "frames/a.png --coupling photon --ratio 4",
     ];
-    check_rows(cases, |(args, message)| {
-        let refused = bench.call(&[&["synthesize", "--out", "out"], args].concat());
-        assert_eq!(refused.code, Some(2), "{refused:?}");
-        assert_eq!(
-            refused.stderr.trim_end().lines().count(),
-            1,
-            "{}",
-            refused.stderr
-        );
-        assert!(refused.stderr.contains(message), "{}", refused.stderr);
+    let errors = each(calls, |call| {
+        let refused = bench.call(&words(&format!("synthesize --out out {call}")));
+        assert_eq!(refused.stderr.trim_end().lines().count(), 1, "{refused:?}");
+        refused.messages()
     });
+    insta::assert_snapshot!(errors, @r#"
+    frames
+      exit code: 2
+      error: INPUT: "a.png" of frames and "a.PNG" of frames would both be written as a; rename one of them, or give
+          each folder its own --out
+    none
+      exit code: 2
+      error: none: cannot read: [OS ERROR]
+    frames/a.png --camera my.toml
+      exit code: 2
+      error: my.toml, line 1: not a calibration: missing field `gain`
+    frames/a.png --sheet all
+      exit code: 2
+      error: invalid value 'all' for '--sheet <SHEET>' [possible values: levels, noise]
+    frames/a.png --from my.toml
+      exit code: 2
+      error: my.toml: not a JSON file of an image: expected ident at line 1 column 2
+    frames/a.png --coupling photon --ratio 4
+      exit code: 2
+      error: --noise ratio: with --noise coupling=photon, or a profile that has it, the ratio is 2^EV; leave out
+          --noise ratio
+    "#);
     let small = bench.call(&words("synthesize frames/a.png --out out --max-pixels 100"));
     insta::assert_snapshot!(small.messages(), @"
     exit code: 1
@@ -518,33 +529,37 @@ fn walk(folder: &Path, end: &str) -> std::path::PathBuf {
 fn what_camera_cannot_do_is_refused() {
     let bench = Bench::new();
     frames(&bench);
-    check_rows(
-        [
-            (
-                "--variant auto --auto gain=5",
-                "--auto: at 5 stops of gain, K is 12, but sony-a7s2 has K from 0.1 to 6",
-            ),
-            ("--variant auto --auto gian=5", "did you mean gain?"),
-            (
-                "--variant motion --motion sped=5",
-                "there is no setting \"sped\"; the settings are speed, hfov, angle; did you mean speed?",
-            ),
-            (
-                "--variant motion --levels L3",
-                "--levels: L3 is a level of ev, noise, auto, but --variant motion selects none of them",
-            ),
-            (
-                "--variant blur",
-                "\"blur\" is not one of ev, noise, auto, motion, both, all",
-            ),
-        ],
-        |(flags, message)| {
-            let call = format!("synthesize frames --out out {flags}");
-            let refused = bench.call(&words(&call));
-            assert_eq!(refused.code, Some(2), "{refused:?}");
-            assert!(refused.stderr.contains(message), "{}", refused.stderr);
-        },
-    );
+    let flags = [
+        "--variant auto --auto gain=5",
+        "--variant auto --auto gian=5",
+        "--variant motion --motion sped=5",
+        "--variant motion --levels L3",
+        "--variant blur",
+    ];
+    let errors = each(flags, |flags| {
+        let call = format!("synthesize frames --out out {flags}");
+        bench.call(&words(&call)).messages()
+    });
+    insta::assert_snapshot!(errors, @r#"
+    --variant auto --auto gain=5
+      exit code: 2
+      error: --auto: at 5 stops of gain, K is 12, but sony-a7s2 has K from 0.1 to 6; set another base-gain or fewer
+          stops of gain
+    --variant auto --auto gian=5
+      exit code: 2
+      error: invalid value 'gian=5' for '--auto <KEY=VALUE,…>': there is no setting "gian"; the settings are
+          shutter, gain, base-gain, base-time; did you mean gain?
+    --variant motion --motion sped=5
+      exit code: 2
+      error: invalid value 'sped=5' for '--motion <KEY=VALUE,…>': there is no setting "sped"; the settings are
+          speed, hfov, angle; did you mean speed?
+    --variant motion --levels L3
+      exit code: 2
+      error: --levels: L3 is a level of ev, noise, auto, but --variant motion selects none of them
+    --variant blur
+      exit code: 2
+      error: invalid value 'blur' for '--variant <LIST>': "blur" is not one of ev, noise, auto, motion, both, all
+    "#);
     // How far a picture moves depends on its size: the image fails, with its name.
     let far = "--variant motion --levels T33.33,T500 --motion speed=2000";
     let far = bench.call(&words(&format!("synthesize frames --out out {far}")));

@@ -7,6 +7,7 @@ use serde_json::Value;
 use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::house::House;
 use crate::support::run::{Bench, Called, called, records, words};
+use crate::support::snapshot::each;
 
 fn table(id: &str, url: &str, more: &str) -> String {
     format!("[[model]]\nid = \"{id}\"\nendpoints = [\"{url}\"]\n{more}\n")
@@ -399,45 +400,43 @@ fn defaults_may_hold_run_settings() {
     bench.file("models.toml", models("max-tokens = 9"));
     run("variable", "", &[("DARKQA_MAX_SIDE", "16")]);
     assert_eq!(image("variable")["width"], 16);
-    for (defaults, more, part) in [
-        (
-            "max-side = \"wide\"",
-            "",
-            "models.toml, line 2: invalid value 'wide'",
-        ),
-        (
-            "max-side = [3]",
-            "",
-            "models.toml, line 2: max-side: a text, a number or a switch expected",
-        ),
-        (
-            "",
-            "max-side = 3",
-            "max-side applies to all models, because each image is made once: set it in [defaults], or use --max-side",
-        ),
-        ("", "image = \"png\"", "image applies to all models"),
-    ] {
+    let lines = [
+        ("max-side = \"wide\"", ""),
+        ("max-side = [3]", ""),
+        ("", "max-side = 3"),
+        ("", "image = \"png\""),
+    ];
+    let errors = lines.map(|(defaults, more)| {
         bench.file("models.toml", models(defaults) + more);
-        let refused = bench.call(&words(&format!("{line} wrong")));
-        assert_eq!(refused.code, Some(2), "{refused:?}");
-        assert!(refused.stderr.contains(part), "{}", refused.stderr);
-    }
+        bench.call(&words(&format!("{line} wrong"))).messages()
+    });
+    insta::assert_snapshot!(errors.join("\n"), @"
+    exit code: 2
+    error: models.toml, line 2: invalid value 'wide' for '--image max-side=<PIXELS>': invalid digit found in
+        string
+    exit code: 2
+    error: models.toml, line 2: max-side: a text, a number or a switch expected
+    exit code: 2
+    error: models.toml, line 7: max-side applies to all models, because each image is made once: set it in
+        [defaults], or use --max-side
+    exit code: 2
+    error: models.toml, line 7: image applies to all models, because each image is made once: set it in
+        [defaults], or use --image
+    ");
     // Where the command has no such flag, the line says so; and open questions have no choices.
     let house = House::new();
     let line = "openeqa --questions questions.json --frames walks --num-frames 2 --levels L0 --models models.toml --out run";
-    for (defaults, part) in [
-        (
-            "max-side = 32",
-            "models.toml, line 2: max-side: this command has no --max-side",
-        ),
-        (
-            "temperature = 0\nprobabilities = true",
-            "open questions have no choices",
-        ),
-    ] {
+    let defaults = ["max-side = 32", "temperature = 0\nprobabilities = true"];
+    let errors = each(defaults, |defaults| {
         house.0.file("models.toml", models(defaults));
-        let refused = house.0.call(&words(line));
-        assert_eq!(refused.code, Some(2), "{refused:?}");
-        assert!(refused.stderr.contains(part), "{}", refused.stderr);
-    }
+        house.0.call(&words(line)).messages()
+    });
+    insta::assert_snapshot!(errors, @r"
+    max-side = 32
+      exit code: 2
+      error: models.toml, line 2: max-side: this command has no --max-side
+    temperature = 0 \n probabilities = true
+      exit code: 2
+      error: probabilities: m: open questions have no choices
+    ");
 }

@@ -7,7 +7,8 @@ mod rows;
 
 use std::fs;
 
-use crate::support::run::Bench;
+use crate::support::run::{Bench, words};
+use crate::support::snapshot::each;
 use crate::support::table::check_rows;
 use image::{Rgb, RgbImage};
 use serde_json::Value;
@@ -198,29 +199,34 @@ fn broken_pair_does_not_stop_others() {
     exit code: 1
     1 pair failed
     ");
-    let rows = [
-        (&["realism", "nowhere"][..], "nowhere"),
-        (&["realism", "pairs/low"], "--normal DIR"),
-        (&["realism", "pairs", "--ev", "99"], "--ev"),
-        (
-            &["realism", "pairs", "--kl-bins", "two"],
-            "'--kl-bins <KL_BINS>' [possible values: fu, kousha]",
-        ),
-        (&["realism"], "PAIRS"),
+    let calls = [
+        "realism nowhere",
+        "realism pairs/low",
+        "realism pairs --ev 99",
+        "realism pairs --kl-bins two",
+        "realism",
     ];
-    check_rows(rows, |(args, message)| {
-        let refused = bench.call(args);
-        assert_eq!(refused.code, Some(2), "{args:?}: {refused:?}");
-        assert_eq!(
-            refused.stderr.trim_end().lines().count(),
-            1,
-            "{}",
-            refused.stderr
-        );
-        assert!(
-            refused.stderr.contains(message),
-            "{args:?}: {}",
-            refused.stderr
-        );
+    let errors = each(calls, |call| {
+        let refused = bench.call(&words(call));
+        assert_eq!(refused.stderr.trim_end().lines().count(), 1, "{refused:?}");
+        refused.messages()
     });
+    insta::assert_snapshot!(errors, @"
+    realism nowhere
+      exit code: 2
+      error: nowhere: cannot read: [OS ERROR]
+    realism pairs/low
+      exit code: 2
+      error: pairs/low: no pairs in it; expected are folders normal and low (or high and low, val_rgb_h and
+          val_rgb_l), or files like normal1.png and low1.png; --normal DIR and --low DIR name any two folders
+    realism pairs --ev 99
+      exit code: 2
+      error: invalid value '99' for '--ev <EV>': a number from -20 to 20 expected
+    realism pairs --kl-bins two
+      exit code: 2
+      error: invalid value 'two' for '--kl-bins <KL_BINS>' [possible values: fu, kousha]
+    realism
+      exit code: 2
+      error: the following required arguments were not provided: <PAIRS>
+    ");
 }
