@@ -216,7 +216,7 @@ fn probabilities_and_responses_come_through_batch() {
     }
 }
 
-/// What is known of a vendor's lines: Azure has a path of its own for chat completions.
+/// Azure has its own path for chat completions.
 #[test]
 fn batch_line_uses_vendor_path() {
     for (more, url) in [

@@ -20,7 +20,7 @@ fn scene(number: u32) -> RgbImage {
     })
 }
 
-/// The image with so many EV less light, in linear sRGB.
+/// The image with `ev` EV less light, in linear sRGB.
 fn darker(image: &RgbImage, ev: f64) -> RgbImage {
     let linear = |code: f64| {
         if code <= 0.04045 {
@@ -84,7 +84,7 @@ fn with_photographs(dark: impl Fn(u32) -> RgbImage, extra: &str) -> Bench {
 
 const DARK: &str = ",\"dark\":\"low/{}.png\"";
 
-/// Replies that are right, but for these conditions, each with so many scenes answered wrongly.
+/// Right replies, except to the first questions in these conditions.
 fn script(bench: &Bench, wrong: &[(&str, u32)]) {
     let mut lines = "{\"default\":\"brown\"}\n".to_owned();
     for (condition, count) in wrong {

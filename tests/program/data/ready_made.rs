@@ -338,7 +338,7 @@ fn answer_outside_options_is_refused() {
     "#);
 }
 
-/// A set of eight yes-or-no questions, two about each of four images, of which the last two pairs have one that says no.
+/// Eight yes-or-no questions, two about each of four images; the last two pairs have one "no" each.
 fn pairs() -> Bench {
     let bench = Bench::new();
     let mut rows = Vec::new();
@@ -500,7 +500,7 @@ fn report_counts_incomplete_groups() {
     "#);
 }
 
-/// Twenty-four questions about an image each, of which the files of some are replaced by these bytes.
+/// Twenty-four questions with an image each; some files are missing or hold other bytes.
 fn with_unusable(unusable: &[(usize, Option<Vec<u8>>)]) -> Bench {
     let bench = Bench::new();
     let mut lines = String::new();

@@ -119,7 +119,7 @@ fn called(thing: &ThingTruth) -> String {
     word.unwrap_or(thing.class).to_owned()
 }
 
-/// What is wrong with an answer, by what the generator knows.
+/// Error of an answer according to the room generator.
 fn wrong(asked: &GeneratedQuestion, seen: &Seen) -> Option<String> {
     let (answer, about) = (asked.answer(), asked.about.as_str());
     let truth = match &asked.question.family {

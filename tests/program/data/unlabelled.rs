@@ -442,7 +442,7 @@ fn photographs_in_the_dark() -> Bench {
     bench
 }
 
-/// What a reader is told of photographs in the dark.
+/// Notice about photographs taken in the dark.
 const NOTICE: &str = "These photographs were taken in the dark (--light dark): L0 is each as photographed, there is no image in the light";
 
 #[test]

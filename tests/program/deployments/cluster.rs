@@ -141,7 +141,7 @@ fn evicted_pod_has_not_failed() {
     }
 }
 
-/// What a namespace asks of its pods that enforces the standard `restricted`.
+/// Requirements for pods in a namespace that enforces the standard `restricted`.
 #[test]
 fn a_restricted_namespace_takes_the_pods() {
     for manifest in MANIFESTS {

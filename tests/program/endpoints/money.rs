@@ -186,7 +186,7 @@ fn dollars(replies: u64) -> f64 {
     (100 + replies * 100) as f64 / 1e6
 }
 
-/// A reply that is charged so many tokens; `usage` changes what is stated of them.
+/// A reply charged `tokens` tokens; `usage` changes the stated counts.
 fn charged(tokens: u64, usage: &Value) -> Answer {
     let mut body = json!({
         "choices": [{"message": {"content": "C"}, "finish_reason": "stop"}],
@@ -231,7 +231,7 @@ fn limited(
     (called, cost)
 }
 
-/// What a server may charge for without a word, with short and long replies in any order.
+/// Silent charges of a server, with short and long replies in any order.
 #[test]
 fn limit_holds_whatever_is_charged_for() {
     type Answers = fn(u64) -> (Answer, u64);

@@ -160,7 +160,7 @@ fn replica_of_other_model_is_unused() {
     );
 }
 
-/// A server of these models alone, each of which it names in its replies.
+/// A server of only these models; its replies name the model.
 fn serving_models(known: &'static [&'static str]) -> MockEndpoint {
     MockEndpoint::answering(move |request| {
         std::thread::sleep(Duration::from_millis(5));
@@ -252,7 +252,7 @@ fn model_without_replica_leaves_others() {
     assert!(shares.iter().all(|share| *share > 0), "{shares:?}");
 }
 
-/// What the program can send in another way takes no replica from a model.
+/// A request that can be adapted costs a model no replica.
 #[test]
 fn refused_api_keeps_replicas() {
     let bench = Bench::with_questions(4);

@@ -14,9 +14,9 @@ use crate::support::snapshot::redacted;
 /// Three frames in four enhanced images each.
 const IMAGES: usize = 3 * 4;
 
-/// What is said of an enhancer of which the store has all images.
+/// Message for an enhancer whose images are all in the store.
 const NOT_OPENED: &str = "one: not opened, because the store has all its images";
-/// What is said when one of them is damaged.
+/// Message when a stored image is damaged.
 const OPENED: &str = "one: opened, because the store lacks an image";
 
 /// A run about small rooms with an enhancer; `--timings` says what the store gave.

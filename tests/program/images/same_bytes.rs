@@ -13,7 +13,7 @@ const LIGHT: &str = "--profile all --variant all --levels L0,L2,9,T33.33 --seed 
 /// Conditions of `LIGHT`: L0, and by level exposure drop alone, four readings of noise, automatic exposure; and a motion blur.
 const CONDITIONS: usize = 1 + 2 * 6 + 1;
 
-/// A random model about frames of which the rooms know the camera.
+/// Random answers about room frames with a known camera.
 fn evaluate(bench: &Bench, more: &str) {
     bench.complete(&words(&format!(
         "--model random --data rooms:frames=3,size=96x64 {more}"

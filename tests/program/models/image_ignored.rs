@@ -48,7 +48,7 @@ fn bench() -> Bench {
     bench
 }
 
-/// What an endpoint is asked.
+/// A question to an endpoint.
 struct Asked {
     frame: usize,
     question: usize,

@@ -198,7 +198,7 @@ fn inherited_defaults_check_model_address() {
     }
 }
 
-/// What is sent with `defaults` and the keys `more` of one table, whose address is a mock's.
+/// The request sent with `defaults` and the keys `more` of one table for a mock server.
 fn sent(defaults: &str, more: &str, line: &str) -> crate::support::endpoint::Request {
     let mock = MockEndpoint::start([Answer::text("C")]);
     let bench = Bench::with_questions(1);

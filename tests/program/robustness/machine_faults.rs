@@ -91,7 +91,7 @@ impl Scene {
         child
     }
 
-    /// Kills the run in a folder once there are so many records.
+    /// Kills the run in a folder once it has `records` records.
     fn kill_at(&self, out: &str, records: usize) {
         let mut child = self.spawned(out, records);
         signal(&child, "-9");

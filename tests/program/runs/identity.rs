@@ -169,7 +169,7 @@ impl Scene {
         assert_eq!(self.kept(out), kept, "{otherwise}");
     }
 
-    /// A command on the folder of a run asks so many new trials, and none of those that are there.
+    /// Asserts that a command on a run's folder asks `new` new trials and no existing one.
     fn adds(&self, flags: &Flags, otherwise: &str, out: &str, new: usize) {
         let (asked, kept) = (self.endpoint.requests().len(), self.kept(out));
         self.complete(flags, otherwise, out);
@@ -353,7 +353,7 @@ const ADDITIONS: [Addition; 23] = [
     ("", "--observer-controls", 0),
 ];
 
-/// What may be added to a run of open questions.
+/// Additions that a run of open questions accepts.
 const OPEN_ADDITIONS: [Addition; 10] = [
     ("", "--model m --model n", 6),
     ("", "--model n", 6),
@@ -375,7 +375,7 @@ const OPEN_ADDITIONS: [Addition; 10] = [
     ("--limit 2", "--limit 3", 2),
 ];
 
-/// What changes no answer: given on the folder of a run, it asks nothing.
+/// Settings that change no answer: on a run's folder they ask nothing.
 const NOTHING: [&str; 42] = [
     "--max-pixels 1000000",
     "--threads 1",

@@ -32,7 +32,7 @@ const FAMILIES: [&str; 2] = ["color", "presence"];
 const OF_EACH: usize = 12;
 const CONDITIONS: [&str; 5] = ["L0", "L1-ev", "L1-noise", "L4-ev", "L4-noise"];
 
-/// How many of the questions of each family a model gets right in each condition: the first so many.
+/// Number of right replies per family and condition; the first questions are right.
 const SKILLS: [(&str, [[usize; 2]; 5]); 3] = [
     ("a", [[12, 12], [12, 7], [10, 9], [4, 3], [1, 2]]),
     ("b", [[6, 9], [10, 4], [9, 4], [3, 3], [8, 0]]),

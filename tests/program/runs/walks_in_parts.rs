@@ -60,7 +60,7 @@ fn flags(mock: &MockEndpoint, more: &str) -> String {
     )
 }
 
-/// What is asked, by key.
+/// Trials by key.
 fn asked(run: &std::path::Path) -> BTreeMap<String, Value> {
     records(run)
         .into_iter()

@@ -87,7 +87,7 @@ fn of(records: &[Record], draws: &Resamples) -> Calibration {
     found.remove(0)
 }
 
-/// Calibrations of so many simulated runs.
+/// Calibrations of `runs` simulated runs.
 fn simulated(
     seed: u64,
     runs: usize,

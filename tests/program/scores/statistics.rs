@@ -73,7 +73,7 @@ fn clusters_of(records: &[Record]) -> Clusters {
     Clusters::new(asked, &FrameTies::default())
 }
 
-/// So many questions about each of so many frames.
+/// Number of questions about each frame.
 fn sizes(random: &mut StdRng, frames: usize, least: usize, most: usize) -> Vec<usize> {
     (0..frames)
         .map(|_| random.random_range(least..=most))

@@ -46,7 +46,7 @@ fn short_output_stops_the_run() {
     }
 }
 
-/// Asserts that every trial has a reply, and that the second batch has so many requests.
+/// Asserts that every trial has a reply, and that the second batch has `again` requests.
 fn assert_each_once_but_lost(bench: &Bench, mock: &MockBatches, again: usize) {
     assert_eq!(answered(bench).len(), QUESTIONS);
     assert_eq!(mock.asked()[1].len(), again);

@@ -254,7 +254,7 @@ fn an_interrupt_leaves_the_batches_working() {
     assert_each_once(&bench, &mock, QUESTIONS);
 }
 
-/// Keeps so many lines of a file.
+/// Keeps the first lines of a file.
 fn keep_lines(bench: &Bench, file: &str, count: usize) {
     let path = bench.path(file);
     let text = fs::read_to_string(&path).unwrap();

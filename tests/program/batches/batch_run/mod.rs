@@ -58,7 +58,7 @@ fn answered(bench: &Bench) -> Vec<Value> {
     records
 }
 
-/// Asserts that so many trials have one right reply each, and that none was in two batches that were begun.
+/// Asserts that `trials` trials have one right reply each, and that no trial was in two started batches.
 fn assert_each_once(bench: &Bench, mock: &MockBatches, trials: usize) {
     let answered = answered(bench);
     assert_eq!(answered.len(), trials);

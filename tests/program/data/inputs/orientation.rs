@@ -72,7 +72,7 @@ fn orientations_that_mean_nothing_turn_nothing() {
     }
 }
 
-/// A folder with two images of one scene, the first of which is turned by its file.
+/// A folder with two images of one scene; the first has an EXIF orientation.
 fn folder(bench: &Bench, name: &str, first: &[u8]) {
     bench.file(&format!("{name}/a.png"), first);
     bench.file(&format!("{name}/b.png"), png(&image()));

@@ -99,7 +99,7 @@ fn responses_request_has_correct_form() {
     assert_eq!(body, expected);
 }
 
-/// What servers say, the answers after it, and the field of a request by which the wire is known.
+/// Refusals, the answers after them, and the request field that identifies the wire.
 #[test]
 fn auto_learns_wire_from_refusal() {
     let cases = [

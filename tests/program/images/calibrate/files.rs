@@ -15,7 +15,7 @@ static SMALL: LazyLock<Shots> = LazyLock::new(|| {
     Shots::take(&sensor, 2, 1)
 });
 
-/// A recording in the folder `cam`, of which one file is changed.
+/// A recording in the folder `cam` with one changed file.
 fn recording(change: impl FnOnce(&Bench)) -> Bench {
     let bench = Bench::new();
     write(&bench, "cam", &SMALL);
@@ -27,7 +27,7 @@ fn file(bench: &Bench, name: &str) -> PathBuf {
     bench.path(&format!("cam/iso800/{name}"))
 }
 
-/// What is changed in the recording.
+/// A change of the recording.
 type Change = fn(&Bench);
 
 /// A recording with one change is refused with a message of these parts.

@@ -13,7 +13,7 @@ use crate::support::table::check_rows;
 
 const ANY: Size = Size::Named("any");
 
-/// What is wrong with a model and its sidecar.
+/// The error of a model with a sidecar.
 fn fault_of(graph: &Graph, sidecar: &str) -> String {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("model.onnx.toml"), sidecar).unwrap();

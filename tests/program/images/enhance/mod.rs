@@ -47,7 +47,7 @@ fn stated(graph: &Graph, sidecar: &str) -> (TempDir, Enhancer) {
     (folder, enhancer)
 }
 
-/// What is wrong with a model.
+/// The error of a model.
 fn fault(graph: &Graph) -> String {
     let folder = tempfile::tempdir().unwrap();
     let path = graph.write(folder.path(), "model.onnx");

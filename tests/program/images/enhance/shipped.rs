@@ -104,7 +104,7 @@ fn trained_enhancer_brings_room_back() {
     }
 }
 
-/// What is flat stays flat, what is empty stays empty, and no edge comes up where there was none.
+/// Flat areas stay flat, empty ones stay empty, and no new edges appear.
 #[test]
 fn the_trained_enhancer_invents_nothing() {
     let mut enhancer = lift();

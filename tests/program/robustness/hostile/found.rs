@@ -91,7 +91,7 @@ fn pipes_and_devices_are_refused() {
     }
 }
 
-/// What the shell writes for `<(command)` is a pipe as well.
+/// The shell's `<(command)` is a pipe, too.
 #[test]
 fn named_pipe_argument_is_read() {
     let bench = Bench::new();

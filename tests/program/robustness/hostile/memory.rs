@@ -100,7 +100,7 @@ fn record_keeps_ends_of_long_reply() {
     assert_eq!(record["lenient"]["chosen"], 2, "{record}");
 }
 
-/// A Parquet file of so many equal rows.
+/// A Parquet file of `rows` equal rows.
 fn parquet(rows: usize) -> Vec<u8> {
     let columns = ["id", "image", "question", "A", "B", "answer"];
     let fields = columns.map(|name| format!("required binary {name} (utf8);"));

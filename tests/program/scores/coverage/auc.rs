@@ -14,7 +14,7 @@ use darkqa_score::photographs::FidelityFindings;
 const FRAMES: usize = 2;
 const QUESTIONS: usize = 5;
 
-/// What the replies of the conditions share.
+/// Effects that the replies of all conditions share.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Shared {
     /// Effects of the frame and of the question, each with this standard deviation in logits.
@@ -37,7 +37,7 @@ struct AucDesign {
     conditions: usize,
     scenes: usize,
     shared: Shared,
-    /// What one standard deviation of the PSNR adds to the logit of a right reply.
+    /// Effect of one standard deviation of PSNR on the logit of a right reply.
     slope: f64,
 }
 

@@ -20,7 +20,7 @@ type Case = (
     &'static [&'static str],
 );
 
-/// What no wait and no other request helps: one request, and the remedy.
+/// Failures that neither waiting nor another request solves: one request, and the remedy.
 #[test]
 #[expect(clippy::too_many_lines, reason = "a table")]
 fn vendor_failure_wordings_are_recognized() {
