@@ -216,7 +216,7 @@ fn habitat_renders_of_matterport_and_replica() {
 }
 
 #[test]
-fn faulty_renders_are_named() {
+fn faulty_render_labels_are_named() {
     let scene = habitat();
     fs::remove_file(scene.at("00800-x/x.semantic.txt")).unwrap();
     insta::assert_snapshot!(redacted(&scene.refused("habitat", &[])), @"
@@ -248,6 +248,10 @@ fn faulty_renders_are_named() {
     insta::assert_snapshot!(redacted(&scene.refused("habitat", &[])), @r#"
     error: [TMP]/src/00800-x/x.semantic.txt, line 2: a name between quotes expected in id,colour,"name",region
     "#);
+}
+
+#[test]
+fn render_of_eight_bits_is_skipped() {
     let scene = habitat();
     scene.shallow("00800-x/semantic/001.png", 3, 3);
     fs::remove_file(scene.at("00800-x/semantic/001.npy")).unwrap();
@@ -264,6 +268,12 @@ fn faulty_renders_are_named() {
             .count(),
         4
     );
+}
+
+#[test]
+fn existing_frames_need_force() {
+    let scene = habitat();
+    scene.run("habitat", &[]).ended(0);
     insta::assert_snapshot!(redacted(&scene.refused("habitat", &[])), @"
     error: [TMP]/out/frames.jsonl: the folder has frames already; --force overwrites them, another --out keeps
         both
