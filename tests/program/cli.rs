@@ -74,9 +74,10 @@ fn global_flags_work_around_command() {
 #[test]
 fn evaluation_flags_before_command_are_refused() {
     let bench = Bench::new();
-    insta::assert_snapshot!(refused(&bench, "--levels L0 report nowhere"), @"
-    error: --levels stands before the command report; put its flags after it
-    ");
+    insta::assert_snapshot!(
+        refused(&bench, "--levels L0 report nowhere"),
+        @"error: --levels stands before the command report; put its flags after it"
+    );
 }
 
 #[test]

@@ -245,9 +245,10 @@ fn faulty_render_labels_are_named() {
         "00800-x/x.semantic.txt",
         "HM3D Semantic Annotations\n9,FF,bed,0\n",
     );
-    insta::assert_snapshot!(redacted(&scene.refused("habitat", &[])), @r#"
-    error: [TMP]/src/00800-x/x.semantic.txt, line 2: a name between quotes expected in id,colour,"name",region
-    "#);
+    insta::assert_snapshot!(
+        redacted(&scene.refused("habitat", &[])),
+        @r#"error: [TMP]/src/00800-x/x.semantic.txt, line 2: a name between quotes expected in id,colour,"name",region"#
+    );
 }
 
 #[test]
@@ -472,9 +473,10 @@ fn dumps_of_ai2_thor() {
         ("coffee table", Some("living room"))
     );
     scene.text("FloorPlan201/colors.json", r#"{"red": "Bed|1"}"#);
-    insta::assert_snapshot!(redacted(&scene.refused("thor", &["--force"])), @r#"
-    error: [TMP]/src/FloorPlan201/colors.json: "red" is not a colour; three numbers expected, as in "(12, 34, 56)"
-    "#);
+    insta::assert_snapshot!(
+        redacted(&scene.refused("thor", &["--force"])),
+        @r#"error: [TMP]/src/FloorPlan201/colors.json: "red" is not a colour; three numbers expected, as in "(12, 34, 56)""#
+    );
 }
 
 #[test]

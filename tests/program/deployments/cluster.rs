@@ -105,9 +105,10 @@ fn the_manifests_are_of_one_run() {
     let given = field("job.yaml", "terminationGracePeriodSeconds");
     assert!(grace < given.parse().unwrap());
     let images = MANIFESTS.map(|manifest| field(manifest, "image"));
-    insta::assert_snapshot!(redacted(&images[0]), @"
-    registry.example/darkqa-eval@sha256:[DIGEST]
-    ");
+    insta::assert_snapshot!(
+        redacted(&images[0]),
+        @"registry.example/darkqa-eval@sha256:[DIGEST]"
+    );
     assert!(images.iter().all(|image| *image == images[0]), "{images:?}");
 }
 

@@ -195,9 +195,10 @@ async fn closed_port_is_connection_failure() {
     let model = Remote::open(endpoint, Parameters::new("m".into())).unwrap();
     let error = model.ask(Message::text_only("Red?"), 2).await.unwrap_err();
     assert_eq!(error.failure.kind, FailureKind::Connection);
-    insta::assert_snapshot!(redacted(&error.failure.message.to_lowercase()), @"
-    http://127.0.0.1:[PORT]/v1: error sending request: client error (connect): tcp connect error: [OS ERROR]
-    ");
+    insta::assert_snapshot!(
+        redacted(&error.failure.message.to_lowercase()),
+        @"http://127.0.0.1:[PORT]/v1: error sending request: client error (connect): tcp connect error: [OS ERROR]"
+    );
 }
 
 #[tokio::test]
@@ -394,9 +395,10 @@ async fn scripts_and_guesses_answer_without_endpoint() {
     let script = Model::Script(Script::load(&path).unwrap());
     let error = script.ask(call(&unknown, None)).await.unwrap_err();
     assert_eq!(error.failure.kind, FailureKind::Request);
-    insta::assert_snapshot!(redacted(&error.failure.message), @r#"
-    [TMP]/replies.jsonl has no reply to question q2 and no {"default": ".."} line
-    "#);
+    insta::assert_snapshot!(
+        redacted(&error.failure.message),
+        @r#"[TMP]/replies.jsonl has no reply to question q2 and no {"default": ".."} line"#
+    );
 }
 
 #[test]

@@ -205,9 +205,10 @@ fn program_fields_are_refused_by_name() {
         ],
         &[],
     );
-    insta::assert_snapshot!(redacted(&error), @"
-    error: --extra-body: response_format is set by --request constrain; leave one of them out
-    ");
+    insta::assert_snapshot!(
+        redacted(&error),
+        @"error: --extra-body: response_format is set by --request constrain; leave one of them out"
+    );
 }
 
 /// Bodies are written to the manifest and to files of batches.

@@ -179,9 +179,10 @@ fn nothing_is_written_over_unasked() {
     let message = run(data.path(), "llava", out.path(), &flags)
         .ended(2)
         .stderr;
-    insta::assert_snapshot!(redacted(&message), @"
-    error: [TMP]/L0/questions.jsonl: the set exists already; --force overwrites it, another --out keeps both
-    ");
+    insta::assert_snapshot!(
+        redacted(&message),
+        @"error: [TMP]/L0/questions.jsonl: the set exists already; --force overwrites it, another --out keeps both"
+    );
     run(
         data.path(),
         "llava",
@@ -192,7 +193,8 @@ fn nothing_is_written_over_unasked() {
     let message = run(data.path(), "parquet", out.path(), &flags)
         .ended(2)
         .stderr;
-    insta::assert_snapshot!(redacted(&message), @"
-    error: invalid value 'parquet' for '<KIND>' [possible values: vlmevalkit, imagefolder, llava]
-    ");
+    insta::assert_snapshot!(
+        redacted(&message),
+        @"error: invalid value 'parquet' for '<KIND>' [possible values: vlmevalkit, imagefolder, llava]"
+    );
 }

@@ -257,9 +257,10 @@ fn file_errors_name_their_line() {
     let error = refusal("[defaults]\nid = \"m\"\n[[model]]\nid = \"random\"", "");
     insta::assert_snapshot!(redacted(&error), @"error: models.toml, line 2: id belongs to one model: it cannot be in [defaults]");
     let error = refusal("[[model]]\nname = \"m\"", "");
-    insta::assert_snapshot!(redacted(&error), @"
-    error: models.toml, line 2: a model without id: what the endpoint calls it, or random, observer, script:FILE
-    ");
+    insta::assert_snapshot!(
+        redacted(&error),
+        @"error: models.toml, line 2: a model without id: what the endpoint calls it, or random, observer, script:FILE"
+    );
     let secret = refusal(&table("key-env = \"sk-0123456789\""), "");
     assert!(
         secret.contains("line 4") && !secret.contains("0123"),
@@ -611,9 +612,10 @@ fn vendor_notes_come_before_requests() {
         "constrain = \"json\"",
     );
     let error = refusal(&anthropic, "--dry-run");
-    insta::assert_snapshot!(redacted(&error), @"
-    error: --request constrain: Anthropic takes a constraint and ignores it, so it would be none; leave it out
-    ");
+    insta::assert_snapshot!(
+        redacted(&error),
+        @"error: --request constrain: Anthropic takes a constraint and ignores it, so it would be none; leave it out"
+    );
     for (base, name) in [
         (
             "https://api.anthropic.com/v1",

@@ -61,9 +61,10 @@ fn open_and_unlabelled_runs_have_markdown() {
         "--model random --data frames --ask home --levels L0,L3 --out own",
     ));
     let text = bench.complete(&words("report own --markdown"));
-    insta::assert_snapshot!(lines_with(&text, "without answers"), @"
-    random · 50 questions without answers · 2 images · 250 replies, 0 failed · intervals by frame
-    ");
+    insta::assert_snapshot!(
+        lines_with(&text, "without answers"),
+        @"random · 50 questions without answers · 2 images · 250 replies, 0 failed · intervals by frame"
+    );
     assert!(table(&text).len() > 2, "{text}");
     let house = House::new();
     house.0.file("a.jsonl", "{\"default\": \"an answer\"}\n");

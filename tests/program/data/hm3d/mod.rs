@@ -247,9 +247,10 @@ fn pickle_with_calls_is_refused() {
         name == BED && why.contains("000-hm3d-aaaaAAAA111/00002.pkl"),
         "{why}"
     );
-    insta::assert_snapshot!(redacted(&why), @"
-    000-hm3d-aaaaAAAA111/00002.pkl: it names posix.system, which no agent state needs; nothing of it was run
-    ");
+    insta::assert_snapshot!(
+        redacted(&why),
+        @"000-hm3d-aaaaAAAA111/00002.pkl: it names posix.system, which no agent state needs; nothing of it was run"
+    );
     assert!(
         !house
             .path("states/hm3d-v0/000-hm3d-aaaaAAAA111/was-run")
@@ -378,9 +379,10 @@ fn only_kind_habitat_has_script() {
     let said = house.program(&["import", "nyu", "--script"], 2);
     insta::assert_snapshot!(redacted(&said), @"error: KIND: only the kind habitat has a script, not nyu");
     let said = house.program(&["import", "script", "habitat", "--every", "2"], 2);
-    insta::assert_snapshot!(redacted(&said), @"
-    error: unexpected argument '--every' found; tip: to pass '--every' as a value, use '-- --every'
-    ");
+    insta::assert_snapshot!(
+        redacted(&said),
+        @"error: unexpected argument '--every' found; tip: to pass '--every' as a value, use '-- --every'"
+    );
     let said = house.program(&["import", "habitat"], 2);
     insta::assert_snapshot!(redacted(&said), @"error: the following required arguments were not provided: --src <DIR> --out <DIR>");
 }

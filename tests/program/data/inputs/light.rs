@@ -166,9 +166,10 @@ fn every_lossless_compression_is_read() {
     let at = bytes.windows(name.len()).position(|part| part == name);
     bytes[at.unwrap() + name.len() + 4] = 8;
     let error = file(bytes).decode().unwrap_err().to_string();
-    insta::assert_snapshot!(redacted(&error), @"
-    a file: an OpenEXR image of the lossy compression DWAA or DWAB, which is not read; save it with ZIP or PIZ
-    ");
+    insta::assert_snapshot!(
+        redacted(&error),
+        @"a file: an OpenEXR image of the lossy compression DWAA or DWAB, which is not read; save it with ZIP or PIZ"
+    );
 }
 
 #[test]
@@ -226,9 +227,10 @@ fn invalid_light_is_refused_by_name() {
         ..ReadingRule::default()
     };
     let error = ImageFile::new(whole, "a file".to_owned(), rule).decode();
-    insta::assert_snapshot!(redacted(&error.unwrap_err().to_string()), @"
-    a file: 48 × 32 pixels are more than the 1535 that are read; shrink it first, or raise --decode max-pixels
-    ");
+    insta::assert_snapshot!(
+        redacted(&error.unwrap_err().to_string()),
+        @"a file: 48 × 32 pixels are more than the 1535 that are read; shrink it first, or raise --decode max-pixels"
+    );
 }
 
 /// The matrix of ITU-R BT.2087, table 1, inverted: from the primaries of BT.2020 to those of BT.709.

@@ -132,9 +132,10 @@ fn white_must_be_known() {
     };
     let bench = recording(|_| ());
     let message = refused(&bench, "cam");
-    insta::assert_snapshot!(redacted(&message), @"
-    error: cam: the code of white is not known: state it with --white, or add overexposed frames in SETTING/white/
-    ");
+    insta::assert_snapshot!(
+        redacted(&message),
+        @"error: cam: the code of white is not known: state it with --white, or add overexposed frames in SETTING/white/"
+    );
     let mut white = vec![WHITE; SIDE * SIDE];
     white[..SIDE * SIDE * 2 / 3].fill(WHITE - 9);
     frame(&bench, "white/0.pgm", &white);
@@ -151,9 +152,10 @@ fn white_must_be_known() {
         with --white
     ");
     let message = refused(&bench, "cam --white 400");
-    insta::assert_snapshot!(redacted(&message), @"
-    error: iso800: bias frames of 512 ADU are not below white, 400; see --white and the folders white/
-    ");
+    insta::assert_snapshot!(
+        redacted(&message),
+        @"error: iso800: bias frames of 512 ADU are not below white, 400; see --white and the folders white/"
+    );
     let message = refused(&bench, &format!("cam --white {WHITE} --black 20000"));
     insta::assert_snapshot!(redacted(&message), @"error: --black: the black level 20000 is not below white, 16383");
 }

@@ -299,8 +299,8 @@ fn idle_model_needs_stated_ranges() {
     let called = ask(&stated, "");
     insta::assert_snapshot!(called.lines_with("not brighter"), @"
     exit code: 0
-      are not brighter than the dark frames (mean brightness +0.0 of 255).
-     WARN model: on 6 of 6 dark frames its images are not brighter than the dark frames (mean brightness +0.0 of
+    are not brighter than the dark frames (mean brightness +0.0 of 255).
+    WARN model: on 6 of 6 dark frames its images are not brighter than the dark frames (mean brightness +0.0 of
         255)
     ");
 }

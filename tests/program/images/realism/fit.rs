@@ -267,7 +267,8 @@ fn gain_is_pinned_or_fitted() {
     ");
     // 96 blocks of 8 × 8 pixels are 12 in a bin.
     let few = bench.complete(&["realism", "pairs", "--fit"]);
-    insta::assert_snapshot!(lines_with(&few, "no fit"), @"
-    a, paper: no fit: too few blocks of 8 × 8 pixels are smooth, and neither black nor white
-    ");
+    insta::assert_snapshot!(
+        lines_with(&few, "no fit"),
+        @"a, paper: no fit: too few blocks of 8 × 8 pixels are smooth, and neither black nor white"
+    );
 }

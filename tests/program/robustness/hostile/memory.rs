@@ -188,9 +188,10 @@ fn oversized_archives_are_refused() {
     );
     assert_eq!(finished.code, Some(2));
     let text = stderr(&finished);
-    insta::assert_snapshot!(redacted(&text), @"
-    error: set.zip: more than 500000 entries, which are not read; unpack it, and name its folder
-    ");
+    insta::assert_snapshot!(
+        redacted(&text),
+        @"error: set.zip: more than 500000 entries, which are not read; unpack it, and name its folder"
+    );
 }
 
 /// Makes a file sparse and of 8 TB.

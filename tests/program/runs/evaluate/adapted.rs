@@ -33,9 +33,10 @@ fn refused_field_is_reported() {
     assert_eq!(mock.requests().len(), 31);
     let noted = json!(["no temperature is sent: the server's own is used"]);
     assert_eq!(manifest(&bench)["settings"]["adapted for m"], noted);
-    insta::assert_snapshot!(lines_with(&printed, "Requests"), @"
-    ! Requests to m were changed, because the server refused what was sent first: no
-    ");
+    insta::assert_snapshot!(
+        lines_with(&printed, "Requests"),
+        @"! Requests to m were changed, because the server refused what was sent first: no"
+    );
     // A run in which nothing was refused says nothing of it.
     let other = Bench::with_questions(3);
     let mock = MockEndpoint::start([Answer::text("C")]);

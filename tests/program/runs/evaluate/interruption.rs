@@ -59,9 +59,10 @@ fn interrupt_abandons_requests_after_grace() {
     let output = program.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(130), "{output:?}");
     let said = String::from_utf8(output.stderr).unwrap();
-    insta::assert_snapshot!(redacted(said.trim_start()), @"
-    WARN requests given up while in flight: 1; they may be paid for, and the same command asks them again
-    ");
+    insta::assert_snapshot!(
+        redacted(said.trim_start()),
+        @"WARN requests given up while in flight: 1; they may be paid for, and the same command asks them again"
+    );
     assert_eq!(records(&bench.path("run")).len(), 1);
     let table = String::from_utf8(output.stdout).unwrap();
     insta::assert_snapshot!(redacted(&table), @"

@@ -17,9 +17,10 @@ fn record_and_row_keep_contract() {
     let table = bench.complete(&words(
         "--data frames --model script:script.jsonl --levels L0,L1 --variant ev --out run --full",
     ));
-    insta::assert_snapshot!(lines_with(&table, "(66.7)"), @"
-    script:script.jsonl   untouched       33.3 (66.7)          3      2 (0)        0   −27.2 +45.9
-    ");
+    insta::assert_snapshot!(
+        lines_with(&table, "(66.7)"),
+        @"script:script.jsonl   untouched       33.3 (66.7)          3      2 (0)        0   −27.2 +45.9"
+    );
     let records = records(&bench.path("run"));
     let record = records
         .iter()
