@@ -95,12 +95,11 @@ pub fn each<T: Display>(
     rows: impl IntoIterator<Item = T>,
     mut text: impl FnMut(&T) -> String,
 ) -> String {
-    let mut all = String::new();
-    for row in rows {
+    let rows = rows.into_iter().map(|row| {
         let name = row.to_string().trim_end().replace('\n', " \\n ");
-        all.push_str(&format!("{name}\n  {}\n", text(&row).replace('\n', "\n  ")));
-    }
-    all
+        format!("{name}\n  {}\n", text(&row).replace('\n', "\n  "))
+    });
+    rows.collect()
 }
 
 /// A line in pieces of at most `WIDTH` characters, split at spaces.

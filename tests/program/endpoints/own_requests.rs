@@ -154,7 +154,7 @@ fn extra_body_merges_and_drops_fields() {
     let (bench, request) = request(&line, &[]);
     let mut sent = request.json();
     let question = sent["messages"][1]["content"].take();
-    insta::assert_snapshot!(redacted(&question.as_str().unwrap()), @"
+    insta::assert_snapshot!(redacted(question.as_str().unwrap()), @"
     What color is it, 0?
     A. red
     B. blue

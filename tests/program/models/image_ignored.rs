@@ -103,7 +103,7 @@ fn dropped_images_raise_first_alert() {
     assert_eq!(alerts[0]["kind"], "image_ignored", "{alerts:?}");
     let text = alerts[0]["text"].as_str().unwrap();
     assert!(text.starts_with(words));
-    insta::assert_snapshot!(redacted(&text), @"
+    insta::assert_snapshot!(redacted(text), @"
     The replies of m do not depend on the image: 84 of 84 replies to untouched images are the usual reply to the
         wording although another answer is true (120 replies, 4 wordings, exact binomial test: p < 0.0001). The
         server may drop images, or cache replies by the text.

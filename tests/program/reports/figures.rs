@@ -284,7 +284,7 @@ fn open_run_figures_name_remedy() {
     let called = house.0.call(&words("figures run --out out"));
     assert_eq!(called.code, Some(2), "{called:?}");
     let said = &called.stderr;
-    insta::assert_snapshot!(redacted(&said), @"
+    insta::assert_snapshot!(redacted(said), @"
     error: run: the run asked open questions: figures draws runs of questions with choices; `report` draws the
         figures of these
     ");

@@ -246,7 +246,7 @@ fn dry_run_counts_each_profile() {
         .lines()
         .find(|line| line.starts_with("requests by reading: "));
     let found = found.unwrap();
-    insta::assert_snapshot!(redacted(&found), @"
+    insta::assert_snapshot!(redacted(found), @"
     requests by reading: shared by all (L0, exposure drop, blind) 64 ($0.0488), paper 32 ($0.0244), level 32
         ($0.0244)
     ");

@@ -228,7 +228,7 @@ fn shards_share_limits_and_resources() {
     )));
     assert_eq!(of_part.code, Some(0), "{of_part:?}");
     let words_of = of_part.stderr.split("shard 1/2: ").nth(1).unwrap();
-    insta::assert_snapshot!(redacted(&words_of), @"$4.00 of its $4.00 of --max-cost are left; other parts do not get them");
+    insta::assert_snapshot!(redacted(words_of), @"$4.00 of its $4.00 of --max-cost are left; other parts do not get them");
     let text = fs::read(bench.path("paid/shard-1-of-2/manifest.json")).unwrap();
     let manifest: Value = serde_json::from_slice(&text).unwrap();
     let noted = &manifest["settings"]["--max-cost of this part"];

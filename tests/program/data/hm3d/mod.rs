@@ -248,7 +248,7 @@ fn pickle_with_calls_is_refused() {
         "{why}"
     );
     insta::assert_snapshot!(
-        redacted(&why),
+        redacted(why),
         @"000-hm3d-aaaaAAAA111/00002.pkl: it names posix.system, which no agent state needs; nothing of it was run"
     );
     assert!(

@@ -48,10 +48,10 @@ fn unusable_files_are_named() {
             fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
         }),
         ("foreign", |bench| {
-            fs::write(file(bench, "bias/notes.txt"), "shutter closed").unwrap()
+            fs::write(file(bench, "bias/notes.txt"), "shutter closed").unwrap();
         }),
         ("raw", |bench| {
-            fs::rename(file(bench, "bias/01.pgm"), file(bench, "bias/01.dng")).unwrap()
+            fs::rename(file(bench, "bias/01.pgm"), file(bench, "bias/01.dng")).unwrap();
         }),
         ("developed", |bench| {
             let image = image::RgbImage::new(SIDE as u32, SIDE as u32);
