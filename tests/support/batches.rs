@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use super::endpoint::{Answer, MockEndpoint, Request};
 
-/// What becomes of one batch.
+/// Course of one batch.
 #[derive(Clone)]
 pub struct Course {
     /// The refusal of its creation.
@@ -17,7 +17,7 @@ pub struct Course {
     states: Vec<String>,
     /// The errors of a batch that fails.
     errors: Value,
-    /// What comes of the request with this number.
+    /// Outcome of the request with this number.
     line: fn(usize) -> Line,
     order: Order,
     /// The text of each answer.
@@ -32,7 +32,7 @@ pub struct Course {
     is_late_to_count: bool,
 }
 
-/// What comes of one request.
+/// Outcome of one request.
 #[derive(Debug, Clone, Copy)]
 pub enum Line {
     /// The right answer.
@@ -82,7 +82,7 @@ impl Course {
         Self { uncounted, ..self }
     }
 
-    /// A batch whose output file has no name at so many looks.
+    /// A batch whose output file is named only after `late` polls.
     pub fn late(self, late: usize) -> Self {
         Self { late, ..self }
     }
@@ -95,7 +95,7 @@ impl Course {
         }
     }
 
-    /// A batch whose answers are charged so many tokens each.
+    /// A batch whose answers are charged `tokens` tokens each.
     pub fn tokens(self, tokens: u64) -> Self {
         Self { tokens, ..self }
     }
@@ -167,7 +167,7 @@ pub struct StoredBatch {
     errors: Option<String>,
 }
 
-/// What the server holds.
+/// State of the server.
 #[derive(Default)]
 pub struct Server {
     pub files: Vec<StoredFile>,
@@ -237,7 +237,7 @@ impl MockBatches {
         self.with(|server| server.faults.insert(number, fault));
     }
 
-    /// Files are pending for so many looks after their upload.
+    /// Files are pending for this number of polls after their upload.
     pub fn pending(&self, looks: usize) {
         self.with(|server| server.pending = looks);
     }

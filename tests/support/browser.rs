@@ -124,7 +124,7 @@ impl Browser {
         }
     }
 
-    /// What an expression gives in the page.
+    /// Value of an expression in the page.
     pub fn evaluate(&mut self, expression: &str) -> Value {
         let parameters =
             json!({"expression": expression, "returnByValue": true, "awaitPromise": true});

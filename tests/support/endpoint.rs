@@ -49,7 +49,7 @@ enum Manner {
     Whole,
     /// The body as it stands, without a status line or headers of our making; then the connection closes.
     Raw,
-    /// The head at once, the body byte by byte with so many milliseconds between.
+    /// The head at once, the body byte by byte with a pause in milliseconds.
     Drip(u64),
     /// So many bytes of the body, whose whole length was announced; then the connection closes.
     Cut(usize),
@@ -94,7 +94,7 @@ impl Answer {
         )
     }
 
-    /// A whole chat completion whose prompt is charged so many tokens.
+    /// A complete chat completion with this number of prompt tokens.
     pub fn message_charged(text: &str, prompt_tokens: u64) -> Self {
         let message = json!({"role": "assistant", "content": text});
         Self::json(
@@ -281,7 +281,7 @@ impl MockEndpoint {
         format!("http://{}/v1", self.address)
     }
 
-    /// What was received so far.
+    /// Bytes received so far.
     pub fn requests(&self) -> Vec<Request> {
         self.shared.requests.lock().unwrap().clone()
     }

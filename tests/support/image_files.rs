@@ -198,7 +198,7 @@ pub fn png_with_profile(image: &RgbImage, profile: &[u8]) -> Vec<u8> {
     with_chunks(&png(image), &[profile_chunk(profile)])
 }
 
-/// A JPEG file with an ICC profile in two parts, of which the second comes first.
+/// A JPEG file with an ICC profile in two parts, the second part first.
 pub fn jpeg_with_profile(jpeg: &[u8], profile: &[u8]) -> Vec<u8> {
     let (first, second) = profile.split_at(profile.len() / 2);
     let part = |number: u8, data: &[u8]| [b"ICC_PROFILE\0", &[number, 2][..], data].concat();

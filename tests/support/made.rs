@@ -5,7 +5,7 @@ use darkqa_ground::types::{
     TrialOutcome,
 };
 
-/// What a model made of one question in one condition: the first of three choices is true.
+/// A model's reply to one question in one condition; the first of three choices is true.
 pub fn record(
     model: &str,
     condition: &Condition,

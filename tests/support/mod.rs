@@ -24,6 +24,7 @@ pub mod process;
 pub mod recording;
 pub mod rooms;
 pub mod run;
+pub mod snapshot;
 pub mod table;
 pub mod tiff_files;
 pub mod tools;

@@ -698,17 +698,17 @@ pub fn noisy() -> Graph {
     })
 }
 
-/// What an enhancer adds to the image.
+/// The map that an enhancer adds to the image.
 pub fn residual() -> Graph {
     after_enhancing(|graph| graph.node("Sub", &["enhanced", "input"], "output"))
 }
 
-/// What an authors' script subtracts from the image.
+/// The map that an authors' script subtracts from the image.
 pub fn subtracted() -> Graph {
     after_enhancing(|graph| graph.node("Sub", &["input", "enhanced"], "output"))
 }
 
-/// What an authors' script multiplies the image with.
+/// The factor in an authors' script.
 pub fn gain_map() -> Graph {
     after_enhancing(|graph| {
         graph
@@ -782,7 +782,7 @@ pub fn cast(to: Type) -> Graph {
         .output("output", to, &image(3))
 }
 
-/// Black planes around the image: seven channels, of which 4, 5 and 6 are the image.
+/// Black planes around the image: seven channels; 4, 5 and 6 are the image.
 pub fn seven_channels() -> Graph {
     let axis = [("axis", Attribute::Int(1))];
     let axes = [("axes", Attribute::Ints(&[1]))];

@@ -19,7 +19,7 @@ pub struct Bench {
     folder: TempDir,
 }
 
-/// What a call gave.
+/// Exit code and output of a call.
 #[derive(Debug)]
 pub struct Called {
     pub code: Option<i32>,
@@ -46,7 +46,7 @@ impl Bench {
         self.folder.path().join(name)
     }
 
-    /// A folder with `set.jsonl`: so many questions of three choices about one small brown picture, the third being true.
+    /// A folder with `set.jsonl`: `count` questions with three choices about one small brown picture; the third is true.
     pub fn with_questions(count: usize) -> Self {
         let bench = Self::new();
         let picture = image::RgbImage::from_pixel(64, 48, image::Rgb([90, 60, 30]));
@@ -122,7 +122,7 @@ pub fn called(command: &mut Command) -> Called {
     }
 }
 
-/// What every line of `records.jsonl` must be: of questions with choices, and of open ones.
+/// Schemas of the lines of `records.jsonl`: for questions with choices, and for open ones.
 static SCHEMAS: LazyLock<(Schemas, [SchemaIndex; 2])> = LazyLock::new(|| {
     let (mut schemas, mut compiler) = (Schemas::new(), Compiler::new());
     let indices = [

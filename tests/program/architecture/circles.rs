@@ -76,7 +76,7 @@ fn reachable<'a>(file: &str, imports: &Imports<'a>) -> BTreeSet<&'a str> {
     reached
 }
 
-/// What each file imports of the others, tests left out.
+/// Imports between files, without tests.
 fn imports(files: &Files) -> Imports<'_> {
     let mut imports: Imports<'_> = files
         .iter()

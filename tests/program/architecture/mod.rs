@@ -136,12 +136,12 @@ fn assert_none(wrong: &[String]) {
 }
 
 #[test]
-fn the_map_has_the_rooms_of_src() {
+fn map_has_rooms_of_src() {
     assert_none(&the_map().untrue(&FILES.rooms(), &CRATES));
 }
 
 #[test]
-fn rooms_use_only_what_the_map_allows() {
+fn rooms_use_only_what_map_allows() {
     assert_none(&rules::imports(&FILES, &the_map(), &CRATES));
 }
 
@@ -152,7 +152,7 @@ fn no_command_uses_another() {
 }
 
 #[test]
-fn files_do_not_import_each_other_in_circles() {
+fn files_have_no_import_cycles() {
     assert_none(&circles::wrong(crates(), &CIRCLES));
 }
 
@@ -171,7 +171,7 @@ fn futures_are_awaited_in_their_places() {
 
 /// Each stands there with its number and its reason, so that a new one is seen by who reads the page.
 #[test]
-fn unsafe_code_is_listed_in_the_security_page() {
+fn security_page_lists_unsafe_code() {
     let page = Path::new(env!("CARGO_MANIFEST_DIR")).join(".github/SECURITY.md");
     let listed = unsafe_code::listed(&fs::read_to_string(page).unwrap());
     let counts = crates().flat_map(Files::iter).filter_map(|source| {
@@ -195,7 +195,7 @@ fn no_code_is_missing() {
 
 /// Debug output has no promised form: a new field would change every digest that it enters.
 #[test]
-fn no_digest_is_made_of_debug_output() {
+fn no_digest_uses_debug_output() {
     let makers: Vec<_> = crates().flat_map(digests::makers).collect();
     assert!(makers.len() > 20, "{makers:?}");
     let found: Vec<_> = makers

@@ -6,7 +6,7 @@ use syn::punctuated::Punctuated;
 use syn::visit::{self, Visit};
 use syn::{Attribute, LitStr, Meta, Token, UseTree};
 
-/// What the rules ask about one file.
+/// Facts about one file that the rules use.
 pub(crate) struct Source {
     /// Its path in `src/`.
     pub(crate) path: String,
@@ -33,7 +33,7 @@ pub(crate) struct Part {
     pub(crate) in_test: bool,
 }
 
-/// What a part is.
+/// Kind of a part.
 pub(crate) enum Kind {
     /// A path in an expression, a type, a pattern, an attribute or the tokens of a macro. A path of one name is here if it
     /// is the name of a type, of a constant or of a function that is called.

@@ -56,7 +56,7 @@ fn expired(request: &Value) -> String {
 }
 
 #[test]
-fn what_is_left_goes_out_in_files_and_comes_back_in_any_order() {
+fn exported_batches_return_in_any_order() {
     let bench = Bench::with_questions(QUESTIONS);
     let message = export(&bench, "--file-requests 5");
     // L0, L3 in both variants, and blind: 4 conditions of 4 questions.
@@ -81,11 +81,12 @@ fn what_is_left_goes_out_in_files_and_comes_back_in_any_order() {
 
     // An evaluation leaves alone what is out; so does a second export.
     let idle = bench.call(&args(""));
-    assert_eq!(idle.code, Some(1), "{idle:?}");
-    assert!(
-        idle.stderr.contains("16 trials are waiting for a batch"),
-        "{idle:?}"
-    );
+    insta::assert_snapshot!(idle.messages(), @"
+    exit code: 1
+     WARN 16 trials are waiting for a batch and not asked here; import the replies with batch run, batch fetch or
+        batch import; batch cancel run ends what batch run has submitted, and frees it; or delete run/batch to ask
+        here
+    ");
     assert!(export(&bench, "").starts_with("0 requests in 0 files"));
 
     // Two expired, the rest in any order, a stranger among them.
@@ -107,10 +108,10 @@ fn what_is_left_goes_out_in_files_and_comes_back_in_any_order() {
             .starts_with("replies: 14 imported, 2 failed, 1 of another run\n"),
         "{back:?}"
     );
-    assert!(
-        back.stdout.contains("14 of 16 trials answered, 2 failed"),
-        "{back:?}"
-    );
+    insta::assert_snapshot!(back.lines_with("answered"), @"
+    exit code: 1
+    ! run: incomplete: 14 of 16 trials answered, 2 failed. The same command asks the
+    ");
     let again = bench.call(&["batch", "import", "run", "out.jsonl", "errors.jsonl"]);
     assert!(
         again
@@ -148,11 +149,10 @@ fn broken_files_are_named() {
     let good = answer(&requests(&bench)[0], "C");
     bench.file("out.jsonl", format!("{good}\n{{\"custom\""));
     let broken = bench.call(&["batch", "import", "run", "out.jsonl"]);
-    assert_eq!(broken.code, Some(2));
-    assert!(
-        broken.stderr.contains("out.jsonl, line 2: not a line"),
-        "{broken:?}"
-    );
+    insta::assert_snapshot!(broken.messages(), @r#"
+    exit code: 2
+    error: out.jsonl, line 2: not a line of a Batch API's output: {"custom_id", "response", "error"} expected
+    "#);
     assert_eq!(
         records(&bench.path("run")).len(),
         1,
@@ -169,17 +169,15 @@ fn broken_files_are_named() {
         assert!(called.stderr.contains(message), "{called:?}");
     });
     let wrong = [words("batch export"), args("--file-size 1 --url v1")].concat();
-    assert!(
-        bench
-            .call(&wrong)
-            .stderr
-            .contains("for '--url <PATH>': a path expected")
-    );
+    insta::assert_snapshot!(bench.call(&wrong).messages(), @"
+    exit code: 2
+    error: invalid value 'v1' for '--url <PATH>': a path expected, as /v1/chat/completions
+    ");
 }
 
 /// Lines of each API, and probabilities in them, are what single requests are.
 #[test]
-fn probabilities_and_responses_come_through_a_batch() {
+fn probabilities_and_responses_come_through_batch() {
     let bench = Bench::with_questions(QUESTIONS);
     export(&bench, "--probabilities --wire responses");
     let requests = requests(&bench);
@@ -218,9 +216,9 @@ fn probabilities_and_responses_come_through_a_batch() {
     }
 }
 
-/// What is known of a vendor's lines: Azure has a path of its own for chat completions.
+/// Azure has its own path for chat completions.
 #[test]
-fn the_path_in_a_line_is_that_of_the_vendor() {
+fn batch_line_uses_vendor_path() {
     for (more, url) in [
         ("", "/chat/completions"),
         ("--wire responses", "/v1/responses"),

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::support::run::{Called, PROGRAM, called};
+use crate::support::snapshot::redacted;
 use crate::support::table::check_rows;
 use darkqa_eval::internals::dataset::Dataset;
 use darkqa_ground::types::{DepthKind, Frame, FrameId};
@@ -161,10 +162,11 @@ fn habitat() -> Scene {
 fn habitat_renders_of_hm3d() {
     let scene = habitat();
     let message = scene.run("habitat", &["--every", "2"]).ended(0).stdout;
-    assert!(
-        message.contains("2 frames of 1 scene") && message.contains("\"bed, made\" 1"),
-        "{message}"
-    );
+    insta::assert_snapshot!(redacted(&message), @r#"
+    [TMP]/out: 2 frames of 1 scene, chosen from 5
+    typical depth: 2.00 m
+    without a class of mpcat40, taken as misc: "bed, made" 1
+    "#);
     let set = Dataset::from_frames(&scene.out(), &[]).unwrap();
     let names: Vec<&str> = set.frames().map(|id| id.0.as_str()).collect();
     assert_eq!(names, ["00800-x/000", "00800-x/003"]);
@@ -214,42 +216,52 @@ fn habitat_renders_of_matterport_and_replica() {
 }
 
 #[test]
-fn what_is_wrong_with_renders_is_said() {
+fn faulty_render_labels_are_named() {
     let scene = habitat();
     fs::remove_file(scene.at("00800-x/x.semantic.txt")).unwrap();
-    assert!(
-        scene
-            .refused("habitat", &[])
-            .contains("none of *.semantic.txt")
-    );
+    insta::assert_snapshot!(redacted(&scene.refused("habitat", &[])), @"
+    error: [TMP]/src/00800-x: none of *.semantic.txt (HM3D-Sem), *.house (Matterport3D), info_semantic.json
+        (Replica) in this folder; one of them must name the instances of the semantic maps
+    ");
     scene.text(
         "00800-x/x.semantic.txt",
         "HM3D Semantic Annotations\n9,FF,\"bed\",0\n",
     );
     let message = scene.refused("habitat", &[]);
-    assert!(
-        message.contains("scene_dataset_config.json")
-            && message.contains("no frame of it could be read"),
-        "{message}"
-    );
+    insta::assert_snapshot!(redacted(&message), @"
+    ERROR 00800-x/000: [TMP]/src/00800-x/semantic/000.npy: no pixel has the number of an instance that the scene
+        names; habitat-sim writes 0 everywhere if the scene is opened without its *.scene_dataset_config.json
+    ERROR 00800-x/001: [TMP]/src/00800-x/semantic/001.npy: no pixel has the number of an instance that the scene
+        names; habitat-sim writes 0 everywhere if the scene is opened without its *.scene_dataset_config.json
+    ERROR 00800-x/002: [TMP]/src/00800-x/semantic/002.npy: no pixel has the number of an instance that the scene
+        names; habitat-sim writes 0 everywhere if the scene is opened without its *.scene_dataset_config.json
+    ERROR 00800-x/003: [TMP]/src/00800-x/semantic/003.npy: no pixel has the number of an instance that the scene
+        names; habitat-sim writes 0 everywhere if the scene is opened without its *.scene_dataset_config.json
+    ERROR 00800-x/004: [TMP]/src/00800-x/semantic/004.npy: no pixel has the number of an instance that the scene
+        names; habitat-sim writes 0 everywhere if the scene is opened without its *.scene_dataset_config.json
+    error: [TMP]/src: no frame of it could be read
+    ");
     scene.text(
         "00800-x/x.semantic.txt",
         "HM3D Semantic Annotations\n9,FF,bed,0\n",
     );
-    assert!(
-        scene
-            .refused("habitat", &[])
-            .contains("x.semantic.txt, line 2: a name between quotes")
+    insta::assert_snapshot!(
+        redacted(&scene.refused("habitat", &[])),
+        @r#"error: [TMP]/src/00800-x/x.semantic.txt, line 2: a name between quotes expected in id,colour,"name",region"#
     );
+}
+
+#[test]
+fn render_of_eight_bits_is_skipped() {
     let scene = habitat();
     scene.shallow("00800-x/semantic/001.png", 3, 3);
     fs::remove_file(scene.at("00800-x/semantic/001.npy")).unwrap();
     // 8 bits hold no numbers of instances; the other frames are taken.
     let message = scene.run("habitat", &[]).ended(1).stderr;
-    assert!(
-        message.contains("001.png: a grey PNG of 8 bits; 16-bit grey expected"),
-        "{message}"
-    );
+    insta::assert_snapshot!(redacted(&message), @"
+    ERROR 00800-x/001: [TMP]/src/00800-x/semantic/001.png: a grey PNG of 8 bits; 16-bit grey expected, whose
+        samples are the values themselves
+    ");
     assert_eq!(
         Dataset::from_frames(&scene.out(), &[])
             .unwrap()
@@ -257,11 +269,16 @@ fn what_is_wrong_with_renders_is_said() {
             .count(),
         4
     );
-    assert!(
-        scene
-            .refused("habitat", &[])
-            .contains("the folder has frames already; --force")
-    );
+}
+
+#[test]
+fn existing_frames_need_force() {
+    let scene = habitat();
+    scene.run("habitat", &[]).ended(0);
+    insta::assert_snapshot!(redacted(&scene.refused("habitat", &[])), @"
+    error: [TMP]/out/frames.jsonl: the folder has frames already; --force overwrites them, another --out keeps
+        both
+    ");
     scene.run("habitat", &["--force", "--count", "2"]).ended(0);
     assert_eq!(
         Dataset::from_frames(&scene.out(), &[])
@@ -324,7 +341,10 @@ fn frames_of_scannet() {
         &format!("{{\"segGroups\":[{groups}]}}"),
     );
     let message = scene.refused("scannet", &["--force"]);
-    assert!(message.contains("256 objects, but the 8 bits"), "{message}");
+    insta::assert_snapshot!(redacted(&message), @"
+    error: [TMP]/src/scene0000_00/scene0000_00.aggregation.json: 256 objects, but the 8 bits of instance-filt hold
+        255: their numbers overflow; export them with 16 bits, as in frames_25k
+    ");
 }
 
 #[test]
@@ -351,10 +371,11 @@ fn images_and_maps_of_nyu() {
     scene.deep("depth/00001.png", 10_000, 15_000);
     scene.shallow("labels/00001.png", 3, 255);
     let message = scene.refused("nyu", &["--labels", "nyu40-1"]);
-    assert!(
-        message.contains("depth_scale is missing") && message.contains("--depth-scale"),
-        "{message}"
-    );
+    insta::assert_snapshot!(redacted(&message), @"
+    ERROR src/00001: [TMP]/src/depth/00001.png: depth_scale is missing: the metres in one unit of the depth PNG,
+        as 0.001 (--depth-scale METRES sets it)
+    error: [TMP]/src: no frame of it could be read
+    ");
     let set = scene.import("nyu", &["--labels", "nyu40-1", "--depth-scale", "0.0002"]);
     let frame = frame(&set, "src/00001");
     assert_eq!(sides(frame.depth.as_ref()), (2000, 3000));
@@ -364,13 +385,16 @@ fn images_and_maps_of_nyu() {
         "the camera is that of 640 × 480"
     );
     let message = scene.refused("nyu", &["--force", "--depth-scale", "0.00001"]);
-    assert!(
-        message.contains("typical depth of the frames is 0.1 m")
-            && message.contains("--depth-scale"),
-        "{message}"
-    );
+    insta::assert_snapshot!(redacted(&message), @"
+    error: depth: the typical depth of the frames is 0.1 m, but that of rooms is between 0.3 and 15 m; set
+        --depth-scale to the metres per unit of depth
+    ");
     let message = scene.refused("nyu", &["--force", "--depth-scale", "1"]);
-    assert!(message.contains("deeper than any room"), "{message}");
+    insta::assert_snapshot!(redacted(&message), @"
+    ERROR src/00001: [TMP]/src/depth/00001.png: a depth of 10000 m, deeper than any room (1000 m at most); a .npy
+        file is in metres and a PNG in units of its depth_scale, with 0 where there is no depth
+    error: [TMP]/src: no frame of it could be read
+    ");
 }
 
 #[test]
@@ -402,10 +426,12 @@ fn frames_of_sun_rgb_d() {
     // Which of the two was read is said, by frame and in all.
     assert_eq!(scene.line(0)["depth_from"], "depth_bfx");
     let out = scene.run("sunrgbd", &["--force"]).ended(0).stdout;
-    assert!(
-        out.contains("frames by the folder of their depth: depth_bfx 1\n"),
-        "{out}"
-    );
+    insta::assert_snapshot!(redacted(&out), @"
+    [TMP]/out: 1 frame of 1 scene
+    typical depth: 2.00 m
+    frames by the folder of their depth: depth_bfx 1
+    not read: kv1/b3dodata/img_0063/depth/img_0063.png
+    ");
     assert_eq!(sides(frame.segments.as_ref()), (3, 1));
     assert_eq!(classes(&set, &frame), pair("chest_of_drawers", "wall"));
     assert_eq!(frame.room.as_deref(), Some("living room"));
@@ -447,10 +473,9 @@ fn dumps_of_ai2_thor() {
         ("coffee table", Some("living room"))
     );
     scene.text("FloorPlan201/colors.json", r#"{"red": "Bed|1"}"#);
-    assert!(
-        scene
-            .refused("thor", &["--force"])
-            .contains("\"red\" is not a colour")
+    insta::assert_snapshot!(
+        redacted(&scene.refused("thor", &["--force"])),
+        @r#"error: [TMP]/src/FloorPlan201/colors.json: "red" is not a colour; three numbers expected, as in "(12, 34, 56)""#
     );
 }
 
@@ -461,16 +486,14 @@ fn folders_of_images_and_maps() {
     scene.metres("home/depth/a.npy", 2.0, 4.0);
     scene.shallow("home/masks/a.png", 4, 9);
     scene.deep("home/instances/a.png", 300, 0);
-    assert!(
-        scene
-            .refused("folder", &[])
-            .contains("--labels: the label space")
-    );
-    assert!(
-        scene
-            .refused("folder", &["--labels", "klingon"])
-            .contains("ade150, mpcat40, nyu13, nyu40")
-    );
+    insta::assert_snapshot!(redacted(&scene.refused("folder", &[])), @"
+    error: --labels: the label space of the class maps is missing; nyu40, nyu13, mpcat40, ade150 or the path of a
+        classes.json expected
+    ");
+    insta::assert_snapshot!(redacted(&scene.refused("folder", &["--labels", "klingon"])), @r#"
+    error: --labels: "klingon" is neither a file nor one of the built-in label spaces: ade150, mpcat40, nyu13,
+        nyu40
+    "#);
     let set = scene.import(
         "folder",
         &[
@@ -504,7 +527,7 @@ fn folders_of_images_and_maps() {
 }
 
 #[test]
-fn class_maps_of_arrays_are_read_and_other_files_are_named() {
+fn array_class_maps_are_read() {
     let scene = Scene::new();
     for number in 0..3 {
         scene.rgb(&format!("home/rgb/{number}.png"));
@@ -530,14 +553,11 @@ fn class_maps_of_arrays_are_read_and_other_files_are_named() {
         .run("folder", &["--labels", "nyu40", "--count", "2"])
         .ended(0);
     let said = called.stdout;
-    assert!(
-        said.contains("2 frames of 1 scene, chosen from 3"),
-        "{said}"
-    );
-    assert!(
-        said.contains("not read: 3 normals/*.exr, home/notes"),
-        "{said}"
-    );
+    insta::assert_snapshot!(redacted(&said), @"
+    [TMP]/out: 2 frames of 1 scene, chosen from 3
+    typical depth: 2.00 m
+    not read: 3 normals/*.exr, home/notes
+    ");
     let set = Dataset::from_frames(&scene.out(), &[]).unwrap();
     let found = frame(&set, "home/0");
     assert_eq!(sides(found.semantic.as_ref()), (4, 0));
@@ -546,14 +566,11 @@ fn class_maps_of_arrays_are_read_and_other_files_are_named() {
         value.to_le_bytes().to_vec()
     });
     let refused = scene.refused("folder", &["--labels", "nyu40", "--force"]);
-    assert!(
-        refused.contains("70000 is too large for the number of a class"),
-        "{refused}"
-    );
+    insta::assert_snapshot!(redacted(&refused), @"ERROR home/0: [TMP]/src/home/sem/0.npy: 70000 is too large for the number of a class");
 }
 
 #[test]
-fn hypersim_is_read_with_its_maps_in_hdf5() {
+fn hypersim_maps_in_hdf5_are_read() {
     let scene = Scene::new();
     let images = "ai_001_002/images/scene_cam_01";
     scene.rgb("image.png");
@@ -592,11 +609,11 @@ fn hypersim_is_read_with_its_maps_in_hdf5() {
     }
     let called = scene.run("hypersim", &[]).ended(0);
     let said = called.stdout;
-    assert!(said.contains("2 frames of 1 scene"), "{said}");
-    assert!(
-        said.contains("not read: 2 scene_cam_01_geometry_hdf5/*.hdf5, image.png"),
-        "{said}"
-    );
+    insta::assert_snapshot!(redacted(&said), @"
+    [TMP]/out: 2 frames of 1 scene
+    typical depth: 2.00 m
+    not read: 2 scene_cam_01_geometry_hdf5/*.hdf5, image.png
+    ");
     let set = Dataset::from_frames(&scene.out(), &[]).unwrap();
     let found = frame(&set, "ai_001_002/cam_01-0003");
     assert_eq!(found.depth_kind, DepthKind::Euclid);
@@ -659,16 +676,20 @@ fn hdf5(class: u8, bits: u8, size: [u64; 2], data: &[u8]) -> Vec<u8> {
 }
 
 #[test]
-fn a_folder_without_class_maps_says_so() {
+fn folder_without_class_maps_says_so() {
     let scene = Scene::new();
     scene.rgb("rgb/0.png");
     let called = scene.run("folder", &["--labels", "nyu40"]).ended(0);
     let said = called.stdout;
-    assert!(said.contains("no class maps"), "{said}");
+    insta::assert_snapshot!(redacted(&said), @"
+    [TMP]/out: 1 frame of 1 scene
+    no depth: there will be no questions about the closest object
+    no class maps: there will be no questions by rule
+    ");
 }
 
 #[test]
-fn folders_are_joined_and_scenes_of_one_name_told_apart() {
+fn folders_join_with_distinct_scenes() {
     let scene = Scene::new();
     for (folder, class) in [("one", 4), ("two", 5)] {
         scene.rgb(&format!("{folder}/home/rgb/0.png"));
@@ -696,10 +717,10 @@ fn folders_are_joined_and_scenes_of_one_name_told_apart() {
     let said = called(Command::new(PROGRAM).args(["questions", "one", "two", "--out", "q.jsonl"]))
         .ended(2)
         .stderr;
-    assert!(
-        said.contains("import folder --src one --src two --out JOINED"),
-        "{said}"
-    );
+    insta::assert_snapshot!(redacted(&said), @"
+    error: DATA: one folder expected, which a run takes with its questions; darkqa-eval import folder --src one
+        --src two --out JOINED makes one of 2
+    ");
 }
 
 #[test]
@@ -708,34 +729,28 @@ fn broken_folders_are_named() {
     scene.rgb("rgb/a.png");
     scene.shallow("sem/b.png", 1, 2);
     let flags = ["--labels", "nyu40"];
-    assert!(
-        scene
-            .refused("folder", &flags)
-            .contains("b.png: no image has the name of this map")
-    );
+    insta::assert_snapshot!(redacted(&scene.refused("folder", &flags)), @"error: [TMP]/src/sem/b.png: no image has the name of this map");
     fs::remove_file(scene.at("sem/b.png")).unwrap();
     let small = GrayImage::new(3, 3);
     small.save(scene.at("sem/a.png")).unwrap();
     let message = scene.refused("folder", &flags);
-    assert!(
-        message.contains("a.png: 3 × 3 pixels") && message.contains("never scaled"),
-        "{message}"
-    );
-    assert!(Scene::new().refused("habitat", &[]).contains("--src: "));
-    assert!(
-        scene
-            .refused("habitat", &[])
-            .contains("no frames of habitat in this folder")
-    );
-    assert!(
-        scene
-            .refused("lego", &[])
-            .contains("invalid value 'lego' for '<KIND>' [possible values: habitat, scannet")
-    );
-    assert!(
-        scene
-            .refused("folder", &["--labels", "nyu40", "--every", "2", "--force"])
-            .contains("--every: the frame")
-    );
+    insta::assert_snapshot!(redacted(&message), @"
+    ERROR src/a: [TMP]/src/sem/a.png: 3 × 3 pixels (height × width), but its image has 6 × 8; maps of labels are
+        never scaled
+    error: [TMP]/src: no frame of it could be read
+    ");
+    insta::assert_snapshot!(redacted(&Scene::new().refused("habitat", &[])), @"error: --src: [TMP]/src: no such folder");
+    insta::assert_snapshot!(redacted(&scene.refused("habitat", &[])), @"
+    error: [TMP]/src: no frames of habitat in this folder; see the layouts:
+        https://github.com/darkqa-eval/darkqa-eval/blob/main/src/docs/importing.md
+    ");
+    insta::assert_snapshot!(redacted(&scene.refused("lego", &[])), @"
+    error: invalid value 'lego' for '<KIND>' [possible values: habitat, scannet, nyu, sunrgbd, thor, hypersim,
+        folder]
+    ");
+    insta::assert_snapshot!(redacted(&scene.refused("folder", &["--labels", "nyu40", "--every", "2", "--force"])), @"
+    error: --every: the frame src/a has no time; state the frames per second with --fps, or use --count N, which
+        needs no time
+    ");
     assert!(!Path::new(&scene.out().join("frames.jsonl")).exists());
 }

@@ -4,6 +4,7 @@ use std::fs;
 
 use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::run::{Bench, Called, assert_same_products, model_args, records, words};
+use crate::support::snapshot::{lines_with, redacted};
 use image::{Rgb, RgbImage};
 use serde_json::{Value, json};
 
@@ -19,7 +20,7 @@ fn scene(number: u32) -> RgbImage {
     })
 }
 
-/// The image with so many EV less light, in linear sRGB.
+/// The image with `ev` EV less light, in linear sRGB.
 fn darker(image: &RgbImage, ev: f64) -> RgbImage {
     let linear = |code: f64| {
         if code <= 0.04045 {
@@ -83,7 +84,7 @@ fn with_photographs(dark: impl Fn(u32) -> RgbImage, extra: &str) -> Bench {
 
 const DARK: &str = ",\"dark\":\"low/{}.png\"";
 
-/// Replies that are right, but for these conditions, each with so many scenes answered wrongly.
+/// Right replies, except to the first questions in these conditions.
 fn script(bench: &Bench, wrong: &[(&str, u32)]) {
     let mut lines = "{\"default\":\"brown\"}\n".to_owned();
     for (condition, count) in wrong {
@@ -119,14 +120,19 @@ fn number(row: &Value, field: &str) -> f64 {
 }
 
 #[test]
-fn a_photograph_is_a_condition_of_its_own_beside_synthetic_ones() {
+fn photographs_are_a_separate_condition() {
     let bench = with_photographs(|number| darker(&scene(number), 3.6), DARK);
     script(
         &bench,
         &[("dark", 6), ("dark+lift", 2), ("L2-ev", 5), ("L2-noise", 7)],
     );
     let table = run(&bench, "--levels L0,L2 --llie lift --llie-on dark,noise");
-    assert!(table.contains("dark (real, 3.6 EV)"), "{table}");
+    insta::assert_snapshot!(lines_with(&table, "(real"), @"
+    script:script.jsonl   dark (real, 3.6 EV)                          50.0   12          0        0   −24.6
+       +24.6
+    script:script.jsonl   dark (real, 3.6 EV) + lift                   83.3   12          0        0   −28.1
+       +12.0
+    ");
     assert!(table.contains("Photographed in the dark"), "{table}");
     let all = records(&bench.path("run"));
     let of = |condition: &str| -> Vec<&Value> {
@@ -213,7 +219,7 @@ fn a_photograph_is_a_condition_of_its_own_beside_synthetic_ones() {
 }
 
 #[test]
-fn the_bytes_of_a_photograph_are_sent_as_they_lie() {
+fn photograph_bytes_are_sent_unchanged() {
     let bench = with_photographs(|number| darker(&scene(number), 3.0), DARK);
     let endpoint = MockEndpoint::start([Answer::text("C")]);
     let base = endpoint.base_url();
@@ -235,17 +241,32 @@ fn the_bytes_of_a_photograph_are_sent_as_they_lie() {
     bench.complete(&args);
     assert_eq!(endpoint.requests().len(), asked);
     let shown = bench.complete(&words("show run q3 --condition dark --out shown"));
-    assert!(
-        shown.contains("dark: the same bytes as were sent"),
-        "{shown}"
-    );
+    insta::assert_snapshot!(redacted(&shown), @r#"
+    q3, about room3/0
+    What color is it?
+      A. red
+      B. blue
+      C. brown  (true)
+    dark: shown/room3/0_dark.png
+    dark: the same bytes as were sent ([DIGEST])
+      m: ✓ right: "C"
+    "#);
     // A photograph that was changed since is told.
     scene(5).save(bench.path("set/low/3.png")).unwrap();
     let changed = bench.call(&words("show run q3 --condition dark --out shown"));
-    assert!(
-        changed.stdout.contains("NOT the bytes that were sent"),
-        "{changed:?}"
-    );
+    insta::assert_snapshot!(changed, @r#"
+    exit code: 1
+    stdout:
+    q3, about room3/0
+    What color is it?
+      A. red
+      B. blue
+      C. brown  (true)
+    dark: shown/room3/0_dark.png
+    dark: NOT the bytes that were sent: [DIGEST] now
+      m: ✓ right: "C"
+    the data, an enhancement model or this program has changed since the run
+    "#);
 }
 
 #[test]
@@ -267,7 +288,7 @@ fn shards_merge_into_the_same_products() {
 }
 
 #[test]
-fn match_is_as_dark_as_the_photograph_of_each_frame() {
+fn match_uses_brightness_of_each_photograph() {
     let ev = |number| 2.0 + 0.25 * f64::from(number);
     let bench = with_photographs(|number| darker(&scene(number), ev(number)), DARK);
     script(&bench, &[("dark", 6), ("match-ev", 6), ("match-noise", 9)]);
@@ -305,27 +326,29 @@ fn match_is_as_dark_as_the_photograph_of_each_frame() {
     assert!(is(&agreement[1], "same_answer", 0.75));
     // Synthesis at the same exposure gives the same pixels as a level of that number would.
     let shown = bench.complete(&words("show run q4 --condition match-noise --out shown"));
-    assert!(
-        shown.contains("match-noise: the same bytes as were sent"),
-        "{shown}"
-    );
+    insta::assert_snapshot!(redacted(&shown), @r#"
+    q4, about room4/0
+    What color is it?
+      A. red
+      B. blue
+      C. brown  (true)
+    match-noise: shown/room4/0_match-noise.png
+    match-noise: the same bytes as were sent ([DIGEST])
+      script:script.jsonl: ✗ wrong: "red"
+    "#);
 }
 
 #[test]
-fn the_same_image_is_no_darker_and_gives_no_difference() {
+fn same_image_shows_no_difference() {
     let bench = with_photographs(scene, DARK);
     script(&bench, &[]);
     let called = bench.call(&words(
         "--data set --model script:script.jsonl --levels L0 --out run --full",
     ));
-    assert_eq!(called.code, Some(0), "{called:?}");
-    assert!(
-        called
-            .stderr
-            .contains("12 of 12 photographs dark are not darker than their frames"),
-        "{}",
-        called.stderr
-    );
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 0
+     WARN 12 of 12 photographs dark are not darker than their frames.
+    ");
     let rows = rows(&bench, "run/comparisons.csv");
     let level = rows
         .iter()
@@ -337,13 +360,11 @@ fn the_same_image_is_no_darker_and_gives_no_difference() {
     let matched = bench.call(&words(
         "--data set --model random --levels L0,match --out other",
     ));
-    assert_eq!(matched.code, Some(2), "{matched:?}");
-    assert!(
-        matched
-            .stderr
-            .contains("no frame has one that is darker than it"),
-        "{matched:?}"
-    );
+    insta::assert_snapshot!(matched.messages(), @r#"
+    exit code: 2
+    error: --levels: match makes each frame as dark as its photograph, and no frame has one that is darker than
+        it; leave out match, or name photographs as "dark" in frames.jsonl or with --pairs
+    "#);
 }
 
 #[test]
@@ -353,15 +374,22 @@ fn odd_pairs_are_told() {
         bench.call(&words("--data set --model random --levels L0 --out run"))
     };
     let swapped = told(&|number| darker(&scene(number), -1.0), DARK);
-    assert!(
-        swapped
-            .stderr
-            .contains("were normal and low light swapped?"),
-        "{swapped:?}"
-    );
-    assert!(swapped.stdout.contains("light swapped?"), "{swapped:?}");
+    insta::assert_snapshot!(swapped.messages(), @"
+    exit code: 0
+     WARN The photographs dark are brighter than their frames (-1.0 EV): were normal and low light swapped?
+    ");
+    insta::assert_snapshot!(swapped.lines_with("swapped"), @"
+    exit code: 0
+    low light swapped?
+    WARN The photographs dark are brighter than their frames (-1.0 EV): were normal and low light swapped?
+    ");
     let elsewhere = told(&|number| darker(&scene(number + 50), 3.0), DARK);
-    assert!(elsewhere.stderr.contains("another scene"), "{elsewhere:?}");
+    insta::assert_snapshot!(elsewhere.messages(), @"
+    exit code: 0
+     WARN 2 of 12 photographs dark seem to show another scene than their frame, first that of room2/0
+     WARN The photographs dark are 4.47 EV darker than their frames by the mean and 3.79 EV by the median of
+        pixels: they are not one exposure apart, as with another light, a tone curve or synthesis of another kind.
+    ");
     let fair = told(&|number| darker(&scene(number), 3.0), DARK);
     assert_eq!(fair.code, Some(0));
     for word in ["another scene", "swapped", "one exposure"] {
@@ -371,22 +399,22 @@ fn odd_pairs_are_told() {
         &|number| darker(&scene(number), 3.0),
         ",\"dark\":\"low/{}.jpg\"",
     );
-    assert_eq!(missing.code, Some(2));
-    assert!(
-        missing
-            .stderr
-            .contains("frames.jsonl, line 1: no such file"),
-        "{missing:?}"
-    );
+    insta::assert_snapshot!(missing.messages(), @"
+    exit code: 2
+    error: set/frames.jsonl, line 1: no such file: set/low/0.jpg
+    ");
     let stated = told(
         &|number| darker(&scene(number), 3.0),
         ",\"dark\":[{\"path\":\"low/{}.png\",\"ev\":7.5,\"name\":\"lamp\"}]",
     );
-    assert!(stated.stdout.contains("lamp (real, 7.5 EV)"), "{stated:?}");
+    insta::assert_snapshot!(stated.lines_with("(real"), @"
+    exit code: 0
+    lamp (real, 7.5 EV)  16.7   16.7   −12.0 +28.1
+    ");
 }
 
 #[test]
-fn pairs_in_two_folders_are_frames_named_by_their_files() {
+fn two_folders_pair_by_file_name() {
     let bench = Bench::new();
     for folder in ["normal", "low"] {
         fs::create_dir_all(bench.path(folder)).unwrap();
@@ -406,25 +434,38 @@ fn pairs_in_two_folders_are_frames_named_by_their_files() {
     let called = bench.call(&words(&format!(
         "--pairs normal,low --questions q.jsonl {flags}"
     )));
-    assert_eq!(called.code, Some(0), "{called:?}");
-    assert!(
-        called
-            .stderr
-            .contains("images without a partner in the other light, which are not asked: 1"),
-        "{called:?}"
-    );
-    assert!(called.stdout.contains("dark (real, 3.0 EV)"), "{called:?}");
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 0
+     WARN --data: no effect: --pairs names the data
+     WARN images without a partner in the other light, which are not asked: 1, first low/alone.png
+    ");
+    insta::assert_snapshot!(called.lines_with("(real"), @"
+    exit code: 0
+    script:script.jsonl   dark (real, 3.0 EV)           66.7   12          0        0   −27.6 +19.5
+    ");
     let shown = bench.complete(&words("show run q2 --condition dark --out shown"));
-    assert!(shown.contains("the same bytes as were sent"), "{shown}");
+    insta::assert_snapshot!(redacted(&shown), @r#"
+    q2, about 2.png
+    What color is it?
+      A. red
+      B. blue
+      C. brown  (true)
+    dark: shown/2_dark.png
+    dark: the same bytes as were sent ([DIGEST])
+      script:script.jsonl: ✗ wrong: "red"
+    "#);
     let bare = bench.call(&words("--pairs normal,low --model random --out other"));
-    assert!(
-        bare.stderr.contains("--questions FILE names some"),
-        "{bare:?}"
-    );
+    insta::assert_snapshot!(bare.messages(), @"
+    exit code: 2
+     WARN --data: no effect: --pairs names the data
+     WARN images without a partner in the other light, which are not asked: 1, first low/alone.png
+    error: --pairs: pairs of photographs have no questions; --questions FILE names some about the files in normal
+        light
+    ");
 }
 
 #[test]
-fn a_set_in_the_dark_is_asked_as_photographed_and_enhanced() {
+fn dark_set_is_asked_with_enhancement() {
     let bench = Bench::new();
     fs::create_dir_all(bench.path("set")).unwrap();
     for number in 0..SCENES {
@@ -447,8 +488,19 @@ fn a_set_in_the_dark_is_asked_as_photographed_and_enhanced() {
         .map(|record| record["condition"].as_str().unwrap().to_owned())
         .collect();
     assert_eq!(Vec::from_iter(conditions), ["L0", "L0+lift"]);
-    assert!(table.contains("as photographed"), "{table}");
-    assert!(table.contains("mean linear brightness is 0.0"), "{table}");
+    insta::assert_snapshot!(lines_with(&table, "as photographed"), @"
+    ! These photographs were taken in the dark (--light dark): L0 is each as photographed, there is no image in
+        the light to compare with, and no darkness threshold. Their mean linear brightness is 0.0141 of 1
+        (measured on 12); a mid-grey, code 128, is 0.22.
+     model                 light                    as photographed    n   unparsed   failed   95 %
+     script:script.jsonl   as photographed                     50.0   12          0        0   −24.6 +24.6
+     script:script.jsonl   as photographed + lift              75.0   12          0        0   −28.2 +16.1
+    ");
+    insta::assert_snapshot!(lines_with(&table, "linear brightness"), @"
+    ! These photographs were taken in the dark (--light dark): L0 is each as photographed, there is no image in
+        the light to compare with, and no darkness threshold. Their mean linear brightness is 0.0141 of 1
+        (measured on 12); a mid-grey, code 128, is 0.22.
+    ");
     let svg = fs::read_to_string(bench.path("run/figures/photographed.svg")).unwrap();
     assert!(svg.contains("50.0") && svg.contains("75.0"), "bars");
     assert!(!bench.path("run/figures/accuracy.svg").exists());
@@ -458,10 +510,11 @@ fn a_set_in_the_dark_is_asked_as_photographed_and_enhanced() {
     let called = bench.call(&words(
         "--data set --model random --levels L0,L2 --out dark",
     ));
-    assert!(
-        called.stderr.contains("their own noise is in them already"),
-        "{called:?}"
-    );
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 0
+     WARN the photographs were taken in the dark, and --levels darkens them further: their own noise is in them
+        already, so a level is darker and noisier than its name says, and L0 is not an image in the light
+    ");
     // The flag goes before the file.
     let lit = bench.call(&words("--data set --light lit --model random --out lit"));
     assert_eq!(records(&bench.path("lit")).len(), 12 * 11, "{lit:?}");
@@ -470,11 +523,10 @@ fn a_set_in_the_dark_is_asked_as_photographed_and_enhanced() {
         "{\"schema\":\"darkqa.dataset/1\",\"light\":\"dim\"}",
     );
     let wrong = bench.call(&words("--data set --model random --out wrong"));
-    assert_eq!(wrong.code, Some(2));
-    assert!(
-        wrong.stderr.contains("dataset.json") && wrong.stderr.contains("dark"),
-        "{wrong:?}"
-    );
+    insta::assert_snapshot!(wrong.messages(), @"
+    exit code: 2
+    error: set/dataset.json: unknown variant `dim`, expected `lit` or `dark` at line 1 column 42
+    ");
 }
 
 #[test]
@@ -502,12 +554,15 @@ fn folders_of_classes_have_one_question() {
         bench.call(&args)
     };
     let called = asked("", "all");
-    assert_eq!(called.code, Some(0), "{called:?}");
-    assert!(
-        called.stderr.contains("may show things of several"),
-        "{called:?}"
-    );
-    assert!(called.stderr.contains("it is not a class"), "{called:?}");
+    insta::assert_snapshot!(called.messages(), @r#"
+    exit code: 0
+     WARN set/empty: no images in it, so it is not a class
+     WARN a photograph may show things of several of the 4 classes, and the folder names one of them: that name is
+        the true choice; with boxes or tags, make questions instead
+     WARN Folders suggest 4 scenes (Bicycle, Boat, …), but the data name none, so the 12 frames count as
+        independent; a "scene" in each question (or --map scene=COLUMN) names them
+    "#);
+
     let all = records(&bench.path("all"));
     assert_eq!(all.len(), 12);
     for record in &all {
@@ -521,7 +576,21 @@ fn folders_of_classes_have_one_question() {
         assert_eq!(record["choices"].as_array().unwrap().len(), 2, "{record}");
     }
     let many = asked("--choices 9", "nine");
-    assert!(many.stderr.contains("has only 4 classes"), "{many:?}");
+    insta::assert_snapshot!(many.messages(), @"
+    exit code: 2
+     WARN set/empty: no images in it, so it is not a class
+    error: --choices: set has only 4 classes; leave out --choices to offer them all
+    ");
     let shown = bench.complete(&words("show all Cup/1.png --out shown"));
-    assert!(shown.contains("the same bytes as were sent"), "{shown}");
+    insta::assert_snapshot!(redacted(&shown), @r#"
+    Cup/1.png, about Cup/1.png
+    Which of these is in the photograph?
+      A. Bicycle
+      B. Boat
+      C. Cup  (true)
+      D. Dog
+    L0: shown/Cup/1_L0.png
+    L0: the same bytes as were sent ([DIGEST])
+      random: ✗ wrong: "B"
+    "#);
 }

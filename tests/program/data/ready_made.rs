@@ -5,6 +5,7 @@ use std::fs;
 use serde_json::{Value, json};
 
 use crate::support::run::{Bench, words};
+use crate::support::snapshot::{lines_with, redacted};
 
 /// A folder with `set.json`: two questions whose answers are numbers from 0 or from 1, and one that is open.
 fn bench() -> Bench {
@@ -23,7 +24,7 @@ fn bench() -> Bench {
 }
 
 #[test]
-fn a_set_with_two_readings_is_asked_as_the_user_says() {
+fn ambiguous_answers_need_a_mapping() {
     let bench = bench();
     let run = |line: &str| {
         bench.call(&words(&format!(
@@ -31,27 +32,23 @@ fn a_set_with_two_readings_is_asked_as_the_user_says() {
         )))
     };
     let called = run("");
-    assert_eq!(called.code, Some(2));
-    assert!(
-        called.stderr.contains("index0 or as index1"),
-        "{}",
-        called.stderr
-    );
+    insta::assert_snapshot!(called.messages(), @r#"
+    exit code: 2
+    error: set.json: set.json, object 1: the answer "1" may be read as index0 or as index1, which differ among the
+        options ["x", "y", "z"]; --map answer=answer:index0 or --map answer=answer:index1 says which is meant
+    "#);
     let called = run("--map answer=answer:index1");
-    assert!(
-        called
-            .stderr
-            .contains("no options in 1 of 3 rows, where the answer is e.g. \"7\"; --skip open"),
-        "{}",
-        called.stderr
-    );
+    insta::assert_snapshot!(called.messages(), @r#"
+    exit code: 2
+    error: set.json: no options in 1 of 3 rows, where the answer is e.g. "7"; --skip open leaves it out
+    "#);
     let called = run("--map answer=answer:index1 --open skip --out run");
-    assert_eq!(called.code, Some(0), "{called:?}");
-    assert!(
-        called.stderr.contains("left out: 1 of 3 rows (no options)"),
-        "{}",
-        called.stderr
-    );
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 0
+    set: 2 questions on 2 images in 1 family (no column of families)
+    question = question, image = image (files 2), options = options, answer = answer (index1), id = id
+    left out: 1 of 3 rows (no options)
+    ");
     let manifest: Value =
         serde_json::from_slice(&fs::read(bench.path("run/manifest.json")).unwrap()).unwrap();
     let reading = manifest["settings"]["reading of the data"].to_string();
@@ -74,19 +71,17 @@ fn a_set_with_two_readings_is_asked_as_the_user_says() {
 }
 
 #[test]
-fn paths_that_lead_out_are_allowed_by_name_alone() {
+fn outside_paths_need_data_root() {
     let bench = bench();
     fs::create_dir(bench.path("set")).unwrap();
     let line = json!({"id": 1, "image": "../a.png", "question": "?", "choices": ["x", "y"], "answer": "x"});
     bench.file("set/set.jsonl", line.to_string());
     let called = bench.call(&words("--data set/set.jsonl --model random --levels L0"));
-    assert_eq!(called.code, Some(2));
-    for part in [
-        "set.jsonl, line 1: \"../a.png\" lies outside set/",
-        "--data-root ",
-    ] {
-        assert!(called.stderr.contains(part), "{}", called.stderr);
-    }
+    insta::assert_snapshot!(called.messages(), @r#"
+    exit code: 2
+    error: set/set.jsonl, line 1: "../a.png" lies outside set/, the folder of the data; --data-root [TMP] allows
+        the folder that it names; --skip bad leaves such rows out
+    "#);
     bench.complete(&words(
         "--data set/set.jsonl --model random --levels L0 --data-root .",
     ));
@@ -96,40 +91,38 @@ fn paths_that_lead_out_are_allowed_by_name_alone() {
         json!({"id": 1, "frame": "s/0", "question": "?", "choices": ["x", "y"], "answer": "x"});
     bench.file("frames/questions.jsonl", question.to_string());
     let called = bench.call(&words("--data frames --model random --levels L0"));
-    assert!(
-        called
-            .stderr
-            .contains("frames.jsonl, line 1: \"../a.png\" lies outside frames/"),
-        "{}",
-        called.stderr
-    );
+    insta::assert_snapshot!(called.messages(), @r#"
+    exit code: 2
+    error: frames/frames.jsonl, line 1: "../a.png" lies outside frames/, the folder of the data; --data-root [TMP]
+        allows the folder that it names
+    "#);
     bench.complete(&words(
         "--data frames --model random --levels L0 --data-root .",
     ));
     let line = "synthesize frames --out dark --levels L5 --variant ev";
     let called = bench.call(&words(line));
-    assert_eq!(called.code, Some(2));
-    assert!(called.stderr.contains("--data-root "), "{}", called.stderr);
+    insta::assert_snapshot!(called.messages(), @r#"
+    exit code: 2
+    error: frames/frames.jsonl, line 1: "../a.png" lies outside frames/, the folder of the data; --data-root [TMP]
+        allows the folder that it names
+    "#);
     bench.complete(&words(&format!("{line} --data-root .")));
 }
 
 #[cfg(unix)]
 #[test]
-fn links_that_lead_out_of_a_folder_of_images_are_named_and_not_sent() {
+fn outside_links_are_named_and_skipped() {
     let bench = bench();
     fs::create_dir(bench.path("images")).unwrap();
     fs::copy(bench.path("a.png"), bench.path("images/own.png")).unwrap();
     std::os::unix::fs::symlink(bench.path("b.png"), bench.path("images/b.png")).unwrap();
     let line = "synthesize images --out dark --levels L5 --variant ev";
     let called = bench.call(&words(line));
-    assert_eq!(called.code, Some(0), "{called:?}");
-    assert!(
-        called.stderr.contains(
-            "images: 1 link leads out of the folder and is not followed: b.png; --data-root "
-        ),
-        "{}",
-        called.stderr
-    );
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 0
+     WARN images: 1 link leads out of the folder and is not followed: b.png; --data-root [TMP] allows the folder
+        that it leads to
+    ");
     assert!(bench.path("dark/own_L5-ev.png").exists() && !bench.path("dark/b_L5-ev.png").exists());
     let called = bench.call(&words(&format!("{line} --data-root .")));
     assert_eq!(
@@ -141,29 +134,27 @@ fn links_that_lead_out_of_a_folder_of_images_are_named_and_not_sent() {
 }
 
 #[test]
-fn a_check_names_everything_that_is_wrong() {
+fn check_names_everything_that_is_wrong() {
     let bench = bench();
     let line = "check --data set.json --map answer=answer:index1 --open skip";
     let called = bench.call(&words(line));
-    assert_eq!(called.code, Some(0), "{called:?}");
-    for part in [
-        "ok       set: 2 questions on 2 images",
-        "warning  always the letter \"A\" scores 100 %",
-        "ok: 2 questions, ",
-    ] {
-        assert!(called.stdout.contains(part), "{}", called.stdout);
-    }
+    insta::assert_snapshot!(called.lines_with("ok: "), @"
+    exit code: 0
+    ok: 2 questions, 3 warnings
+    ");
     let called = bench.call(&words(&format!(
         "{line} --model gpt-4o --llie none.onnx --prompts nowhere"
     )));
-    assert_eq!(called.code, Some(1), "{called:?}");
-    for part in [
-        "problem  --llie: none.onnx: no such file",
-        "problem  OPENAI_API_KEY",
-        "nowhere",
-    ] {
-        assert!(called.stdout.contains(part), "{part}: {}", called.stdout);
-    }
+    insta::assert_snapshot!(called.lines_with("problem"), @"
+    exit code: 1
+    problem  nowhere: cannot read: [OS ERROR]
+    problem  OPENAI_API_KEY: no key for https://api.openai.com/v1: set this variable, or name another with
+        --api-key-env NAME or a file with --api-key-file FILE; name your own server with --base-url URL;
+        --api-key-env none sends no key
+    problem  --llie: none.onnx: no such file
+    warning  what a run would take is not estimated, as long as there are problems
+    3 problems, 3 warnings
+    ");
     assert!(
         called.stdout.ends_with(" warnings\n") && called.stdout.contains("3 problems"),
         "{}",
@@ -172,11 +163,11 @@ fn a_check_names_everything_that_is_wrong() {
     let cut = fs::read(bench.path("a.png")).unwrap();
     fs::write(bench.path("a.png"), &cut[..cut.len() - 20]).unwrap();
     let called = bench.call(&words(&format!("{line} --deep")));
-    assert!(
-        called.stdout.contains("problem  ") && called.stdout.contains("a.png: not a whole image"),
-        "{}",
-        called.stdout
-    );
+    insta::assert_snapshot!(called.lines_with("problem"), @"
+    exit code: 1
+    problem  a.png: not a whole image: the file ends before its end mark, at byte 257; copy or export it again
+    1 problem, 4 warnings
+    ");
     fs::remove_file(bench.path("a.png")).unwrap();
     let called = bench.call(&words(&format!("{line} --json")));
     let report: Value = serde_json::from_str(&called.stdout).unwrap();
@@ -188,7 +179,7 @@ fn a_check_names_everything_that_is_wrong() {
 }
 
 #[test]
-fn the_template_can_be_checked_and_run_as_it_is() {
+fn template_checks_and_runs_unchanged() {
     let bench = Bench::new();
     let made = bench.complete(&words("init my-data"));
     for line in made
@@ -200,19 +191,32 @@ fn the_template_can_be_checked_and_run_as_it_is() {
     let table = fs::read_to_string(bench.path("my-data/questions.csv")).unwrap();
     assert_eq!(table.lines().count(), 7, "{table}");
     let checked = bench.complete(&words("check my-data"));
-    assert!(checked.contains("ok: 6 questions"), "{checked}");
+    insta::assert_snapshot!(redacted(&checked), @"
+    ok       my-data: 6 questions on 3 images in 3 families (column category)
+    ok       question = question, image = image (files 3), options = A B C D, answer = answer (letter), id =
+        content
+    ok       6 questions, 5 with 2 choices, 1 with 3 choices; chance 47.2 %
+    ok       families: presence 3, affordance 2, closest 1
+    ok       power: 6 questions in 3 frames detects no difference between two conditions; 5 points need about 453
+        frames (one model; level 2.50 % after correction; assumed: 20 % of answers change without an effect,
+        correlation 0.05 in a frame)
+    ok       3 images, 580 kB, 3 of 480×360
+    ok       median brightness 127 of 255 (3 images)
+    warning  no model is named: --model NAME adds it to the check, and what a run would take
+    ok: 6 questions, 1 warning
+    ");
     bench.complete(&words("--data my-data --model random --levels L0,L3"));
     let again = bench.call(&words("init my-data"));
-    assert_eq!(again.code, Some(2));
-    assert!(
-        again.stderr.contains("init overwrites nothing"),
-        "{}",
-        again.stderr
-    );
+    insta::assert_snapshot!(again.messages(), @"
+    exit code: 2
+    error: my-data/README.txt: exists already; init overwrites nothing: name another folder
+    ");
     bench.file("pictures/room2.png", "mine");
     let third = bench.call(&words("init pictures"));
-    assert_eq!(third.code, Some(2), "{third:?}");
-    assert!(third.stderr.contains("room2.png"), "{third:?}");
+    insta::assert_snapshot!(third.messages(), @"
+    exit code: 2
+    error: pictures/room2.png: exists already; init overwrites nothing: name another folder
+    ");
     let own = bench.call(&words("init own --frames my-data"));
     assert_eq!(own.code, Some(0), "{own:?}");
     let table = fs::read_to_string(bench.path("own/questions.csv")).unwrap();
@@ -226,7 +230,14 @@ fn the_template_can_be_checked_and_run_as_it_is() {
     )
     .unwrap();
     let beside = bench.complete(&words("init mine --frames mine"));
-    assert!(beside.contains("mine: 2 questions"), "{beside}");
+    insta::assert_snapshot!(redacted(&beside), @"
+    mine: 2 questions
+
+    next:
+      darkqa-eval check mine
+      darkqa-eval --data mine --model gpt-4o --dry-run
+      darkqa-eval --data mine --model gpt-4o
+    ");
     let check = own
         .stdout
         .lines()
@@ -234,40 +245,49 @@ fn the_template_can_be_checked_and_run_as_it_is() {
         .unwrap();
     let command: Vec<&str> = check.split_whitespace().skip(1).collect();
     let checked = bench.complete(&command);
-    assert!(checked.contains("ok: 6 questions"), "{checked}");
+    insta::assert_snapshot!(redacted(&checked), @"
+    ok       own: 6 questions on 3 images in 1 family (column category)
+    ok       question = question, image = image (files 3), options = A B C D, answer = answer (letter), id =
+        content
+    ok       6 questions, 6 with 2 choices; chance 50.0 %
+    ok       families: form 6
+    ok       power: 6 questions in 3 frames detects no difference between two conditions; 5 points need about 453
+        frames (one model; level 2.50 % after correction; assumed: 20 % of answers change without an effect,
+        correlation 0.05 in a frame)
+    ok       3 images, 580 kB, 3 of 480×360
+    ok       median brightness 127 of 255 (3 images)
+    warning  no model is named: --model NAME adds it to the check, and what a run would take
+    ok: 6 questions, 1 warning
+    ");
     assert!(!checked.contains("always the"), "{checked}");
 }
 
 #[test]
-fn the_table_that_is_not_read_is_named() {
+fn unread_table_is_named() {
     let bench = Bench::new();
     bench.complete(&words("init my-data"));
     fs::create_dir(bench.path("empty")).unwrap();
     let empty = bench.call(&words("--data empty --model random"));
-    assert_eq!(empty.code, Some(2), "{empty:?}");
-    assert!(
-        empty
-            .stderr
-            .contains("the folder is empty: no questions.jsonl or questions.csv"),
-        "{}",
-        empty.stderr
-    );
+    insta::assert_snapshot!(empty.messages(), @"
+    exit code: 2
+    error: empty: the folder is empty: no questions.jsonl or questions.csv in this folder, and no frames.jsonl
+        with classes.json to make questions of; --questions FILE names some, and --ask home asks about photographs
+        without any
+    ");
     let line = json!({"id": "a", "frame": "room1.png", "question": "A?", "choices": ["yes", "no"], "answer": "no", "family": "f"});
     bench.file("my-data/questions.jsonl", format!("{line}\n"));
     let both = bench.call(&words(
         "--data my-data --model random --levels L0 --out run",
     ));
-    assert_eq!(both.code, Some(0), "{both:?}");
-    assert!(
-        both.stderr
-            .contains("questions.csv is not read, because questions.jsonl is in the same folder"),
-        "{}",
-        both.stderr
-    );
+    insta::assert_snapshot!(both.messages(), @"
+    exit code: 0
+     WARN my-data/questions.csv is not read, because questions.jsonl is in the same folder; --data
+        my-data/questions.csv reads it alone
+    ");
 }
 
 #[test]
-fn a_folder_whose_images_are_in_folders_names_its_file_of_questions() {
+fn nested_images_need_question_file() {
     let bench = Bench::new();
     bench.complete(&words("init flat"));
     fs::create_dir_all(bench.path("data/images")).unwrap();
@@ -279,20 +299,29 @@ fn a_folder_whose_images_are_in_folders_names_its_file_of_questions() {
     let line = json!({"id": "a", "frame": "images/room1.png", "question": "A?", "choices": ["yes", "no"], "answer": "no"});
     bench.file("data/questions.jsonl", format!("{line}\n"));
     let folder = bench.call(&words("check data"));
-    assert_eq!(folder.code, Some(1), "{folder:?}");
-    assert!(
-        folder
-            .stdout
-            .contains("name data/questions.jsonl if its lines have paths such as images/IMAGE"),
-        "{}",
-        folder.stdout
-    );
+    insta::assert_snapshot!(folder, @"
+    exit code: 1
+    stdout:
+    problem  data: neither a frames.jsonl nor any PNG, JPEG, WebP, TIFF, BMP or OpenEXR image in this folder; name
+        data/questions.jsonl if its lines have paths such as images/IMAGE
+    warning  no model is named: --model NAME adds it to the check, and what a run would take
+    1 problem, 1 warning
+    stderr:
+     WARN --data: no effect: the data are named without it
+    ");
     let named = bench.complete(&words("check data/questions.jsonl"));
-    assert!(named.contains("1 question on 1 image"), "{named}");
+    insta::assert_snapshot!(lines_with(&named, "1 question"), @"
+    ok       questions: 1 question on 1 image in 1 family (no column of families)
+    ok       1 question, 1 with 2 choices; chance 50.0 %
+    ok       power: 1 question detects no difference between two conditions; 5 points need about 856 questions
+        (one model; level 2.50 % after correction; assumed: 20 % of answers change without an effect, correlation
+        0.05 in a question)
+    ok: 1 question, 3 warnings
+    ");
 }
 
 #[test]
-fn an_answer_that_is_no_text_of_a_choice_is_named_in_the_own_form() {
+fn answer_outside_options_is_refused() {
     let bench = Bench::new();
     bench.complete(&words("init data"));
     fs::remove_file(bench.path("data/questions.csv")).unwrap();
@@ -302,16 +331,14 @@ fn an_answer_that_is_no_text_of_a_choice_is_named_in_the_own_form() {
         format!("{}\n{}\n", line("a", "yes"), line("b", "A")),
     );
     let refused = bench.call(&words("--data data --model random"));
-    assert!(
-        refused
-            .stderr
-            .contains("line 2: the answer \"A\" is not one of the options"),
-        "{}",
-        refused.stderr
-    );
+    insta::assert_snapshot!(refused.messages(), @r#"
+    exit code: 2
+    error: data/questions.jsonl: 1 of 2 rows are broken; the first: data/questions.jsonl, line 2: the answer "A"
+        is not one of the options ["yes", "no"] (read as text, which fits 1 rows); --skip bad=50% leaves it out
+    "#);
 }
 
-/// A set of eight yes-or-no questions, two about each of four images, of which the last two pairs have one that says no.
+/// Eight yes-or-no questions, two about each of four images; the last two pairs have one "no" each.
 fn pairs() -> Bench {
     let bench = Bench::new();
     let mut rows = Vec::new();
@@ -339,7 +366,7 @@ fn line_of(table: &str, starts: &str) -> Vec<String> {
 }
 
 #[test]
-fn a_set_with_groups_has_its_strict_score() {
+fn grouped_set_has_strict_score() {
     let bench = pairs();
     let line = "--data set.json --model random --blind-model random --levels L0,L3";
     bench.complete(&words(&format!("{line} --out plain")));
@@ -349,10 +376,10 @@ fn a_set_with_groups_has_its_strict_score() {
     assert!(!read("plain/questions.jsonl").contains("group"));
     assert!(!read("plain/report.html").contains("Whole groups right"));
     let printed = bench.complete(&words(&format!("{line} --out run --map group=pair --full")));
-    assert!(
-        printed.contains("All questions of a group right"),
-        "{printed}"
-    );
+    insta::assert_snapshot!(lines_with(&printed, "of a group"), @"
+    All questions of a group right, in % of the complete groups, with 95 % intervals; accuracy of the same subject
+        beside it
+    ");
     // The same trials, the same replies.
     assert_eq!(
         read("plain/records.jsonl").lines().count(),
@@ -423,7 +450,7 @@ fn a_set_with_groups_has_its_strict_score() {
 }
 
 #[test]
-fn drawn_questions_break_groups_and_the_report_says_so() {
+fn report_counts_incomplete_groups() {
     let bench = pairs();
     let line = "--data set.json --model random --levels L0 --map group=pair";
     bench.complete(&words(&format!("{line} --limit 5 --out run")));
@@ -463,17 +490,17 @@ fn drawn_questions_break_groups_and_the_report_says_so() {
     let called = bench.call(&words(
         "--data set.json --model random --levels L0 --map group=image --out run",
     ));
-    assert_eq!(called.code, Some(2), "{called:?}");
-    assert!(
-        called
-            .stderr
-            .contains("has another group than in this run; so have 7 more questions"),
-        "{}",
-        called.stderr
-    );
+    insta::assert_snapshot!(called.messages(), @r#"
+    exit code: 2
+    set: 8 questions on 4 images in 1 family (no column of families)
+    question = question, image = image (files 4), answer = answer (yes/no), id = id
+    group = image: 4 groups of 2 questions
+    error: run: question "0" has another group than in this run; so have 7 more questions; restore --data and
+        --questions, or use another --out
+    "#);
 }
 
-/// Twenty-four questions about an image each, of which the files of some are replaced by these bytes.
+/// Twenty-four questions with an image each; some files are missing or hold other bytes.
 fn with_unusable(unusable: &[(usize, Option<Vec<u8>>)]) -> Bench {
     let bench = Bench::new();
     let mut lines = String::new();
@@ -508,7 +535,7 @@ fn transparent() -> Vec<u8> {
 }
 
 #[test]
-fn an_image_that_cannot_be_used_is_left_out_and_counted() {
+fn unusable_image_is_skipped_and_counted() {
     for bytes in [
         None,
         Some(Vec::new()),
@@ -545,7 +572,7 @@ fn an_image_that_cannot_be_used_is_left_out_and_counted() {
 }
 
 #[test]
-fn the_limit_on_unusable_images_is_shared_with_missing_ones_and_can_be_raised() {
+fn unusable_and_missing_share_limit() {
     let bench = with_unusable(&[(3, None), (7, Some(transparent()))]);
     let run = |line: &str| {
         bench.call(&words(&format!(
@@ -553,13 +580,12 @@ fn the_limit_on_unusable_images_is_shared_with_missing_ones_and_can_be_raised() 
         )))
     };
     let called = run("--bad skip --out run");
-    assert_eq!(called.code, Some(2), "{called:?}");
-    assert!(
-        called.stderr.contains("2 of 24 questions are broken"),
-        "{}",
-        called.stderr
-    );
-    assert!(called.stderr.contains("--skip bad=9%"), "{}", called.stderr);
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 2
+    error: set: 2 of 24 questions are broken; the first: img/7.png: the image is transparent in places; flatten it
+        first; --skip bad leaves out at most 5 %: repair the data, or raise the limit with --skip bad=9%
+    ");
+
     let called = run("--bad skip:9% --out run");
     assert_eq!(called.code, Some(0), "{called:?}");
     let records = fs::read_to_string(bench.path("run/records.jsonl")).unwrap();
@@ -571,7 +597,7 @@ fn the_limit_on_unusable_images_is_shared_with_missing_ones_and_can_be_raised() 
 }
 
 #[test]
-fn unusable_photographs_are_left_out_of_a_bank() {
+fn question_bank_skips_unusable_photographs() {
     let bench = with_unusable(&[(7, Some(b"no image".to_vec()))]);
     let bank = json!({"id": "a", "question": "Which?", "choices": ["x \n", "y"]});
     bench.file("bank.jsonl", bank.to_string());
@@ -582,16 +608,17 @@ fn unusable_photographs_are_left_out_of_a_bank() {
     };
     assert_eq!(run("--out run").code, Some(2));
     let called = run("--out run --bad skip");
-    assert_eq!(called.code, Some(0), "{called:?}");
-    assert!(
-        called.stderr.contains("left out: 1 of 24 images"),
-        "{}",
-        called.stderr
-    );
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 0
+    --ask bank.jsonl: 23 questions about 23 images without answers (1 each); each model is compared with its own
+        answers at L0, and is asked without images, too
+    left out: 1 of 24 images (unusable images); the first: img/7.png: not an image: PNG, JPEG, WebP, TIFF, BMP or
+        OpenEXR expected
+    ");
 }
 
 #[test]
-fn a_changed_image_is_named_when_a_run_goes_on() {
+fn changed_image_stops_continued_run() {
     let bench = with_unusable(&[]);
     let run = || {
         bench.call(&words(
@@ -607,12 +634,11 @@ fn a_changed_image_is_named_when_a_run_goes_on() {
         .unwrap();
     }
     let called = run();
-    assert_eq!(called.code, Some(2), "{called:?}");
-    assert!(
-        called.stderr.contains("the image \"img/4.png\" of question \"4\" has changed since the run began; so has 1 more question; restore the file or its --data, or use another --out"),
-        "{}",
-        called.stderr
-    );
+    insta::assert_snapshot!(called.messages(), @r#"
+    exit code: 2
+    error: run: the image "img/4.png" of question "4" has changed since the run began; so has 1 more question;
+        restore the file or its --data, or use another --out
+    "#);
     // Another answer has a message of its own.
     let text = fs::read_to_string(bench.path("set.jsonl")).unwrap();
     let bench = with_unusable(&[]);
@@ -627,9 +653,9 @@ fn a_changed_image_is_named_when_a_run_goes_on() {
         text.replacen("\"answer\":\"x\"", "\"answer\":\"y\"", 1),
     );
     let called = run();
-    assert!(
-        called.stderr.contains("question \"0\" has another answer than in this run: \"y\", before \"x\"; restore --data and --questions"),
-        "{}",
-        called.stderr
-    );
+    insta::assert_snapshot!(called.messages(), @r#"
+    exit code: 2
+    error: run: question "0" has another answer than in this run: "y", before "x"; restore --data and --questions,
+        or use another --out
+    "#);
 }

@@ -5,6 +5,7 @@ use std::fs;
 use serde_json::json;
 
 use crate::support::run::{Bench, words};
+use crate::support::snapshot::redacted;
 
 /// A folder of 24 frames of 12 scenes with two questions each; the questions have a `scene` if `named`.
 fn questions(bench: &Bench, named: bool) {
@@ -36,24 +37,26 @@ fn bench() -> Bench {
 const RUN: &str = "--model random --data set --levels L0,L3 --variant ev --out run";
 
 #[test]
-fn scenes_are_clusters_and_can_be_named_later() {
+fn scenes_cluster_and_are_named_later() {
     let bench = bench();
     questions(&bench, false);
     let suggested = "File names suggest 12 scenes (scene0000, scene0001, …), but the data name none, so the 24 frames count as independent";
     let called = bench.call(&words(RUN));
-    assert_eq!(called.code, Some(0), "{called:?}");
-    assert!(called.stderr.contains(suggested), "{}", called.stderr);
+    insta::assert_snapshot!(called.messages(), @r#"
+    exit code: 0
+     WARN File names suggest 12 scenes (scene0000, scene0001, …), but the data name none, so the 24 frames count
+        as independent; a "scene" in each question (or --map scene=COLUMN) names them
+    "#);
     let joined = |text: &str| text.replace("\n  ", " ");
     assert!(
         joined(&called.stdout).contains(suggested),
         "{}",
         called.stdout
     );
-    assert!(
-        called.stdout.contains("With 24 frames the intervals"),
-        "{}",
-        called.stdout
-    );
+    insta::assert_snapshot!(called.lines_with("the intervals"), @"
+    exit code: 0
+    Sample         ·  With 24 frames the intervals of the findings reach about 16
+    ");
     let check = bench.call(&words("check set"));
     assert!(joined(&check.stdout).contains(suggested), "{check:?}");
     // Named later: nothing is asked again, and the intervals are by scene.
@@ -64,27 +67,42 @@ fn scenes_are_clusters_and_can_be_named_later() {
     assert_eq!(called.code, Some(0), "{called:?}");
     assert!(records() == before);
     assert!(!called.stderr.contains("suggest") && !called.stdout.contains("suggest"));
-    assert!(
-        called.stdout.contains("With 12 scenes the intervals"),
-        "{}",
-        called.stdout
-    );
+    insta::assert_snapshot!(called.lines_with("the intervals"), @"
+    exit code: 0
+    Sample         ·  With 12 scenes the intervals of the findings reach about 18
+    ");
     // What can be detected follows from the scenes, too.
     let check = bench.call(&words("check set"));
-    let power = "power: 48 questions in 12 scenes detects ";
-    assert!(joined(&check.stdout).contains(power), "{check:?}");
+    insta::assert_snapshot!(redacted(&joined(&check.stdout)), @r#"
+    ok       48 questions, 48 with 3 choices; chance 33.3 %
+    ok       families: color 48
+    warning  always the letter "C" scores 100 %; ask the model without images too (--blind-model NAME), or show
+        the choices in other orders (--choice-order shuffle)
+    warning  always the answer "brown" scores 100 %; ask the model without images too (--blind-model NAME), or
+        show the choices in other orders (--choice-order shuffle)
+    ok       power: 48 questions in 12 scenes detects 35.2 points between two conditions in 80 % of such runs; 5
+        points need about 251 scenes (one model; level 2.50 % after correction; assumed: 20 % of answers change
+        without an effect, correlation 0.05 in a scene)
+    ok       24 images, 5 kB, 24 of 32×24
+    ok       median brightness 63 of 255 (24 images)
+    warning  no model is named: --model NAME adds it to the check, and what a run would take
+    ok: 48 questions, 3 warnings
+    "#);
     let dry = bench.call(&words(&format!("{RUN} --dry-run")));
-    assert!(
-        dry.stdout.contains(power) && dry.stdout.contains("; 5 points need about "),
-        "{dry:?}"
-    );
+    insta::assert_snapshot!(dry, @"
+    exit code: 0
+    stdout:
+    Nothing was sent. 0 of 96 trials are left to ask.
+    power: 48 questions in 12 scenes detects 32.8 points between two conditions in 80 % of such runs; 5 points
+        need about 232 scenes (one model; level 3.33 % after correction; assumed: 20 % of answers change without
+        an effect, correlation 0.05 in a scene)
+    ");
     // A file without them takes none away.
     questions(&bench, false);
     let called = bench.call(&words(RUN));
-    assert!(
-        called.stdout.contains("With 12 scenes the intervals"),
-        "{}",
-        called.stdout
-    );
+    insta::assert_snapshot!(called.lines_with("the intervals"), @"
+    exit code: 0
+    Sample         ·  With 12 scenes the intervals of the findings reach about 18
+    ");
     assert!(records() == before);
 }

@@ -6,6 +6,7 @@ use std::fs;
 use serde_json::{Value, json};
 
 use crate::support::run::{Bench, records, words};
+use crate::support::snapshot::redacted;
 
 /// Number of photographs.
 const PHOTOGRAPHS: usize = 12;
@@ -81,7 +82,7 @@ fn number(row: &Value, column: &str) -> f64 {
 
 /// The photographs in the dark would be left aside without a word.
 #[test]
-fn pairs_are_not_asked_without_true_answers() {
+fn pairs_need_true_answers() {
     let bench = photographs();
     for (folder, name) in [("light", "a.png"), ("dark", "a.png")] {
         fs::create_dir_all(bench.path(folder)).unwrap();
@@ -94,26 +95,28 @@ fn pairs_are_not_asked_without_true_answers() {
     let called = bench.call(&words(
         "--pairs light,dark --ask home --model random --levels L0 --out run",
     ));
-    assert_eq!(called.code, Some(2), "{called:?}");
-    assert!(
-        called.stderr.contains("--pairs: ") && called.stderr.contains("--light dark"),
-        "{called:?}"
-    );
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 2
+     WARN --data: no effect: --pairs names the data
+    error: --pairs: the photographs in the dark would not be asked about with --ask: write questions with answers
+        about the files in normal light (--questions), or ask about the dark ones alone with --data DIR --light
+        dark
+    ");
     assert!(!bench.path("run").exists());
 }
 
 #[test]
-fn a_folder_of_photographs_is_asked_and_no_reply_is_right_or_wrong() {
+fn photographs_have_no_true_answers() {
     let bench = photographs();
     let called = bench.call(&words(ASKED));
-    assert_eq!(called.code, Some(0), "{called:?}");
-    for said in [
-        "12 images in it and in the folders below, each named by its path from there",
-        "--ask bank.jsonl: 36 questions about 12 images without answers (3 each)",
-        "is asked without images, too",
-    ] {
-        assert!(called.stderr.contains(said), "{said}: {}", called.stderr);
-    }
+    insta::assert_snapshot!(called.messages(), @r#"
+    exit code: 0
+    photos: 12 images in it and in the folders below, each named by its path from there
+    --ask bank.jsonl: 36 questions about 12 images without answers (3 each); each model is compared with its own
+        answers at L0, and is asked without images, too
+     WARN Folders suggest 2 scenes (hall, kitchen), but the data name none, so the 12 frames count as independent;
+        a "scene" in each question (or --map scene=COLUMN) names them
+    "#);
     let records = records(&bench.path("run"));
     // Twice at L0, once at L1, at L5 and without an image.
     assert_eq!(records.len(), 36 * 5);
@@ -138,7 +141,7 @@ fn a_folder_of_photographs_is_asked_and_no_reply_is_right_or_wrong() {
 }
 
 #[test]
-fn the_report_says_how_far_the_answers_are_those_in_the_light() {
+fn report_measures_agreement_with_l0() {
     let bench = photographs();
     let shown = bench.complete(&words(ASKED));
     let own = rows(&bench, "run/own_answers.csv");
@@ -203,7 +206,7 @@ fn the_report_says_how_far_the_answers_are_those_in_the_light() {
 }
 
 #[test]
-fn the_word_accuracy_stands_over_no_agreement() {
+fn word_accuracy_stands_over_no_agreement() {
     let bench = photographs();
     let shown = bench.complete(&words(ASKED)) + &bench.complete(&["report", "run", "--full"]);
     assert!(!shown.contains("ccuracy"), "{shown}");
@@ -240,7 +243,7 @@ fn the_word_accuracy_stands_over_no_agreement() {
 }
 
 #[test]
-fn a_bank_to_which_all_is_no_gives_no_verdict() {
+fn constant_no_gives_no_verdict() {
     let bench = photographs();
     bench.file("no.jsonl", json!({"default": "B"}).to_string());
     let shown = bench.complete(&words(&ASKED.replace("eyes.jsonl", "no.jsonl")));
@@ -257,7 +260,7 @@ fn a_bank_to_which_all_is_no_gives_no_verdict() {
 }
 
 #[test]
-fn a_model_that_cannot_be_read_in_the_light_is_held_against_nothing() {
+fn unreadable_model_is_not_compared() {
     let bench = photographs();
     bench.file("mute.jsonl", json!({"default": "Well."}).to_string());
     let shown = bench.complete(&words(&ASKED.replace("eyes.jsonl", "mute.jsonl")));
@@ -276,7 +279,7 @@ fn a_model_that_cannot_be_read_in_the_light_is_held_against_nothing() {
 }
 
 #[test]
-fn a_way_out_is_a_measure_of_its_own() {
+fn cannot_tell_has_its_own_measure() {
     let bench = photographs();
     let bank = text(&bench, "bank.jsonl").replace("\"no\"]", "\"no\",\"Cannot tell\"]");
     bench.file("bank.jsonl", bank);
@@ -294,12 +297,7 @@ fn a_way_out_is_a_measure_of_its_own() {
     bench.file("eyes.jsonl", replies);
     let shown = bench.complete(&words(ASKED));
     let shown = on_one_line(&shown);
-    assert!(
-        shown.contains(
-            "script:eyes.jsonl says “cannot tell” to 0.0 % of the questions at L0, and to 100.0 % at L5"
-        ),
-        "{shown}"
-    );
+    assert!(shown.contains("script:eyes.jsonl says “cannot tell” to 0.0 % of the questions at L0, and to 100.0 % at L5"),"{shown}");
     let own = rows(&bench, "run/own_answers.csv");
     let dark = row(
         &own,
@@ -309,7 +307,7 @@ fn a_way_out_is_a_measure_of_its_own() {
 }
 
 #[test]
-fn runs_go_on_grow_and_are_merged() {
+fn runs_continue_grow_and_merge() {
     let bench = photographs();
     let less = ASKED.replace("--levels L0,L1,L5", "--levels L0,L5");
     bench.complete(&words(&less));
@@ -342,7 +340,7 @@ fn runs_go_on_grow_and_are_merged() {
 }
 
 #[test]
-fn fewer_questions_a_photograph_grow_to_more() {
+fn fewer_questions_photograph_grow_to_more() {
     let bench = photographs();
     let few = format!("{ASKED} --ask-per-image 1");
     bench.complete(&words(&few));
@@ -352,7 +350,7 @@ fn fewer_questions_a_photograph_grow_to_more() {
 }
 
 #[test]
-fn two_models_are_held_against_each_other() {
+fn two_models_are_compared_by_agreement() {
     let bench = photographs();
     let shown = bench.complete(&words(&format!("{ASKED} --model random")));
     // References are not compared with models.
@@ -406,7 +404,7 @@ fn what_needs_a_truth_is_refused() {
 }
 
 #[test]
-fn images_of_rooms_and_of_sets_are_asked_too() {
+fn rooms_and_sets_work_without_labels() {
     let bench = photographs();
     let set = json!({"id": "a", "image": "photos/hall/00.png", "question": "?", "choices": ["yes", "no"], "answer": "no"});
     bench.file("set.jsonl", set.to_string());
@@ -418,7 +416,13 @@ fn images_of_rooms_and_of_sets_are_asked_too() {
         assert_eq!(called.code, Some(0), "{called:?}");
         called.stderr
     };
-    assert!(call("set.jsonl", "one").contains("its own questions (1) are ignored"));
+    insta::assert_snapshot!(redacted(&call("set.jsonl", "one")), @"
+    set.jsonl: its own questions (1) are ignored, and those of --ask are asked about its images
+    --ask home:uncertain: 2 questions about 1 image without answers (2 each); each model is compared with its own
+        answers at L0, and is asked without images, too
+     WARN --ask home:uncertain: with one image, nothing shows that an answer depends on the image; name a folder
+        with several
+    ");
     assert_eq!(records(&bench.path("one")).len(), 2 * 4);
     call("rooms:frames=6,size=64x48", "two");
     assert_eq!(records(&bench.path("two")).len(), 12 * 4);
@@ -438,11 +442,11 @@ fn photographs_in_the_dark() -> Bench {
     bench
 }
 
-/// What a reader is told of photographs in the dark.
+/// Notice about photographs taken in the dark.
 const NOTICE: &str = "These photographs were taken in the dark (--light dark): L0 is each as photographed, there is no image in the light";
 
 #[test]
-fn photographs_in_the_dark_are_asked_as_they_are() {
+fn dark_photographs_are_asked_unchanged() {
     let bench = photographs_in_the_dark();
     let line = "--data photos --ask bank.jsonl --model random --out run";
     let called = bench.call(&words(&format!("{line} --light dark")));
@@ -509,8 +513,16 @@ fn photographs_in_the_dark_are_asked_as_they_are() {
     }
     // The same images without the flag are taken for images in the light.
     let called = bench.call(&words(&line.replace("--out run", "--out lit --levels L0")));
-    assert_eq!(called.code, Some(0), "{called:?}");
-    assert!(called.stderr.contains("dark already"), "{called:?}");
+    insta::assert_snapshot!(called.messages(), @r#"
+    exit code: 0
+    photos: 12 images in it and in the folders below, each named by its path from there
+    --ask bank.jsonl: 36 questions about 12 images without answers (3 each); each model is compared with its own
+        answers at L0, and is asked without images, too
+     WARN Folders suggest 2 scenes (hall, kitchen), but the data name none, so the 12 frames count as independent;
+        a "scene" in each question (or --map scene=COLUMN) names them
+     WARN these images are dark already (median brightness 7 of 255); --levels L0 --llie-on l0 asks about them as
+        they are and enhanced, and --light dark does so by default
+    "#);
     let shown = on_one_line(&called.stdout);
     assert!(
         !shown.contains("taken in the dark") && shown.contains("random, untouched"),
@@ -519,7 +531,7 @@ fn photographs_in_the_dark_are_asked_as_they_are() {
 }
 
 #[test]
-fn an_enhancer_of_photographs_in_the_dark_does_no_harm_in_the_light() {
+fn enhancing_bright_photographs_is_reported_harmful() {
     let bench = photographs_in_the_dark();
     let replies = text(&bench, "eyes.jsonl");
     let enhanced: String = replies
@@ -538,10 +550,7 @@ fn an_enhancer_of_photographs_in_the_dark_does_no_harm_in_the_light() {
     let line = "--data photos --ask bank.jsonl --model script:eyes.jsonl --llie lift";
     let of = |flags: &str| on_one_line(&bench.complete(&words(&format!("{line} {flags}"))));
     let dark = of("--light dark --out dark");
-    assert!(
-        dark.contains("Lift changes answers of script:eyes.jsonl to these photographs: whether for the better is not known (trained on this program's synthesis)."),
-        "{dark}"
-    );
+    assert!(dark.contains("Lift changes answers of script:eyes.jsonl to these photographs: whether for the better is not known (trained on this program's synthesis)."),"{dark}");
     assert!(!dark.contains("harm"), "{dark}");
     let lit = of("--levels L0 --llie-on l0 --out lit");
     assert!(lit.contains("harm where nothing was dark"), "{lit}");

@@ -88,7 +88,7 @@ shift 2
 exec env -i \"$(PATH=$PATH:/usr/sbin:/sbin; command -v chroot)\" --userspec=65532:65532 \"$root\" \"$@\"";
 
 #[test]
-fn a_read_only_file_system_without_a_home_or_a_network_suffices() {
+fn read_only_container_needs_no_home() {
     if !may_unshare() {
         skip("it takes root, unshare, chroot and ldd");
         return;

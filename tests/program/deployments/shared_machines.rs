@@ -13,7 +13,7 @@ fn mode(bench: &Bench, name: &str) -> u32 {
 }
 
 #[test]
-fn only_the_user_can_enter_a_new_folder_of_a_run() {
+fn new_run_folder_is_private() {
     let bench = Bench::new();
     bench.complete(&words("rooms --out frames --frames 2 --size 96x64"));
     // What the system gives a new folder here.
@@ -40,7 +40,7 @@ fn only_the_user_can_enter_a_new_folder_of_a_run() {
 }
 
 #[test]
-fn a_folder_that_is_there_keeps_its_mode() {
+fn existing_folder_keeps_its_mode() {
     let bench = Bench::with_questions(2);
     let folder = bench.path("run");
     fs::create_dir(&folder).unwrap();

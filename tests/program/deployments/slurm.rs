@@ -38,7 +38,7 @@ fn with_set() -> Bench {
     bench
 }
 
-/// The script as an array of so many tasks, two at a time, that is waited for.
+/// The call that submits the script as an array of `tasks` tasks, two at a time, and waits for it.
 fn array(bench: &Bench, tasks: usize, args: &[&str]) -> Command {
     let program = std::path::Path::new(PROGRAM);
     let own = program.parent().map(std::path::Path::to_owned).into_iter();
@@ -61,7 +61,7 @@ fn array(bench: &Bench, tasks: usize, args: &[&str]) -> Command {
 
 #[test]
 #[ignore = "needs a Slurm that runs on this machine alone, and takes a minute"]
-fn killed_tasks_go_on_in_another_number_of_parts() {
+fn killed_tasks_resume_in_other_shards() {
     if !succeeds("sinfo", &[]) {
         skip("no Slurm answers");
         return;

@@ -16,7 +16,7 @@ fn quoted(page: &str) -> Vec<&str> {
 }
 
 #[test]
-fn the_quoted_messages_are_in_the_program() {
+fn quoted_messages_are_in_program() {
     let page = Page::read("src/docs/faq.md");
     let program: Vec<String> = files(&root().join("src"))
         .into_iter()

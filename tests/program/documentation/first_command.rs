@@ -57,7 +57,7 @@ fn missing_lines(page: &Page, block: &Block, printed: &[String]) -> Vec<String> 
 }
 
 #[test]
-fn pages_show_what_the_first_command_prints() {
+fn pages_show_what_first_command_prints() {
     let bench = Bench::new();
     let mut arguments = first_command();
     arguments.extend(["--out".to_owned(), "run".to_owned()]);

@@ -104,7 +104,7 @@ fn every_command_parses() {
 }
 
 #[test]
-fn the_commands_of_every_page_run_and_print_what_it_shows() {
+fn documented_commands_print_shown_output() {
     check_rows(pages(), |page| {
         let bench = Bench::new();
         let ran = run(&page, bench.path("").as_path());
@@ -193,7 +193,7 @@ fn missing_lines(page: &Page, printed: &str) -> Vec<String> {
 }
 
 #[test]
-fn every_link_leads_to_a_file_and_a_heading() {
+fn links_lead_to_existing_headings() {
     let mut wrong = Vec::new();
     for page in pages()
         .into_iter()
@@ -250,7 +250,7 @@ fn flags(command: &clap::Command) -> BTreeSet<String> {
 const WITH_EARLIER_FLAGS: [&str; 2] = ["src/docs/report.md", "src/docs/settings.md"];
 
 #[test]
-fn pages_name_every_flag_and_no_other() {
+fn pages_name_exactly_all_flags() {
     let mut command = cli::command();
     command.build();
     let all = flags(&command);
@@ -280,7 +280,7 @@ fn pages_name_every_flag_and_no_other() {
 }
 
 #[test]
-fn the_readme_is_one_page_and_works_in_a_clone() {
+fn readme_works_in_a_clone() {
     let readme = Page::read("README.md");
     let words = readme.text.split_whitespace().count();
     let lines = readme.text.lines().count();

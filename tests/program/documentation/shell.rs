@@ -84,7 +84,7 @@ impl Reader {
 }
 
 #[test]
-fn commands_are_split_as_a_shell_splits_them() {
+fn command_splitting_follows_shell() {
     let lines = [
         "A=1 b 'c d' \"e $F\" g\\ h # i",
         "j \\",

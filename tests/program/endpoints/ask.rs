@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use crate::support::endpoint::{Answer, MockEndpoint};
+use crate::support::snapshot::redacted;
 use crate::support::table::check_rows;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
@@ -59,7 +60,7 @@ fn question(id: &str, text: &str) -> Question {
 }
 
 #[tokio::test]
-async fn a_request_is_the_smallest_every_server_takes() {
+async fn request_is_smallest_every_server_takes() {
     let mock = MockEndpoint::start([Answer::text("B")]);
     let hostile = "say \"url\":\"\" \u{1F512} \\\"}}]}]} \n{{ x }}\u{0}";
     let images = [Arc::new(image())];
@@ -105,7 +106,7 @@ async fn a_request_is_the_smallest_every_server_takes() {
 }
 
 #[tokio::test]
-async fn what_is_set_is_sent_and_what_is_not_is_left_out() {
+async fn only_configured_settings_are_sent() {
     let mock = MockEndpoint::start([Answer::text("B")]);
     let endpoint = endpoint_at(&mock.base_url(), None, quick());
     let parameters = Parameters {
@@ -163,7 +164,7 @@ async fn what_is_set_is_sent_and_what_is_not_is_left_out() {
 }
 
 #[tokio::test]
-async fn base_urls_keep_their_path_and_query() {
+async fn base_urls_keep_path_and_query() {
     let mock = MockEndpoint::start([Answer::text("B")]);
     let root = mock.base_url().replace("/v1", "");
     for (base, line) in [
@@ -181,7 +182,7 @@ async fn base_urls_keep_their_path_and_query() {
 }
 
 #[tokio::test]
-async fn a_closed_port_is_a_connection_failure() {
+async fn closed_port_is_connection_failure() {
     let port = {
         let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
         listener.local_addr().unwrap().port()
@@ -194,14 +195,14 @@ async fn a_closed_port_is_a_connection_failure() {
     let model = Remote::open(endpoint, Parameters::new("m".into())).unwrap();
     let error = model.ask(Message::text_only("Red?"), 2).await.unwrap_err();
     assert_eq!(error.failure.kind, FailureKind::Connection);
-    assert!(
-        error.failure.message.to_lowercase().contains("refused"),
-        "{error}"
+    insta::assert_snapshot!(
+        redacted(&error.failure.message.to_lowercase()),
+        @"http://127.0.0.1:[PORT]/v1: error sending request: client error (connect): tcp connect error: [OS ERROR]"
     );
 }
 
 #[tokio::test]
-async fn a_wait_asked_for_is_kept_by_all() {
+async fn requested_wait_holds_for_all() {
     let limited = |name: &str, value: &str| {
         Answer::error(429, "rate_limit_exceeded", "slow down").header(name, value)
     };
@@ -245,7 +246,7 @@ async fn a_wait_asked_for_is_kept_by_all() {
 }
 
 #[tokio::test]
-async fn a_request_dropped_leaves_the_model_usable() {
+async fn request_dropped_leaves_model_usable() {
     let mock = MockEndpoint::start([Answer::silent(), Answer::text("B")]);
     let model = model_at(&mock, quick());
     let asked = tokio::time::timeout(
@@ -260,7 +261,7 @@ async fn a_request_dropped_leaves_the_model_usable() {
 }
 
 #[tokio::test]
-async fn keys_are_in_no_error_and_no_debug_output() {
+async fn errors_and_debug_hide_keys() {
     let echo = format!("\u{1b}[31mIncorrect key: {KEY}, sent as Bearer {KEY}\n");
     for answer in [
         Answer::error(400, "x", &echo),
@@ -312,7 +313,7 @@ async fn keys_are_in_no_error_and_no_debug_output() {
 }
 
 #[test]
-fn keys_do_not_travel_in_the_open() {
+fn keys_do_not_travel_in_open() {
     let key = Secret::new(KEY, "KEY").unwrap();
     let open = |base: &str, key: Option<&Secret>, allow_http| {
         let access = Access {
@@ -323,7 +324,10 @@ fn keys_do_not_travel_in_the_open() {
         Endpoint::open(access, quick())
     };
     let refused = open("http://10.0.0.7:8000/v1", Some(&key), false).unwrap_err();
-    assert!(refused.to_string().contains("--allow http"), "{refused}");
+    insta::assert_snapshot!(redacted(&refused.to_string()), @"
+    --base-url: the key would be sent unencrypted to http://10.0.0.7:8000/v1; use https://, or --allow http on a
+        network that you trust
+    ");
     assert!(open("http://me:secret@10.0.0.7/v1", None, false).is_err());
     assert!(open("http://10.0.0.7:8000/v1", Some(&key), true).is_ok());
     assert!(open("http://10.0.0.7:8000/v1", None, false).is_ok());
@@ -333,7 +337,7 @@ fn keys_do_not_travel_in_the_open() {
 }
 
 #[tokio::test]
-async fn scripts_and_guesses_answer_without_an_endpoint() {
+async fn scripts_and_guesses_answer_without_endpoint() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("replies.jsonl");
     let condition = "L3-noise".parse().unwrap();
@@ -373,7 +377,7 @@ async fn scripts_and_guesses_answer_without_an_endpoint() {
     assert_eq!(script.ask(open).await.unwrap().text, "C");
     let random = Model::Random(Random { seed: 1 });
     let error = random.ask(open).await.unwrap_err();
-    assert!(error.to_string().contains("q2 has no choices"), "{error}");
+    insta::assert_snapshot!(redacted(&error.to_string()), @"question q2 has no choices, and this model can only choose");
     let reply = random.ask(call(&asked, None)).await.unwrap();
     assert!(["A", "B"].contains(&reply.text.as_str()));
     assert_eq!(random.name(), "random");
@@ -391,12 +395,14 @@ async fn scripts_and_guesses_answer_without_an_endpoint() {
     let script = Model::Script(Script::load(&path).unwrap());
     let error = script.ask(call(&unknown, None)).await.unwrap_err();
     assert_eq!(error.failure.kind, FailureKind::Request);
-    assert!(error.failure.message.contains("replies.jsonl"), "{error}");
-    assert!(error.failure.message.contains("q2"), "{error}");
+    insta::assert_snapshot!(
+        redacted(&error.failure.message),
+        @r#"[TMP]/replies.jsonl has no reply to question q2 and no {"default": ".."} line"#
+    );
 }
 
 #[test]
-fn broken_scripts_are_named_with_their_line() {
+fn broken_scripts_name_their_line() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("replies.jsonl");
     let good = r#"{"question":"q","reply":"B"}"#;

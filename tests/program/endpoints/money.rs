@@ -11,6 +11,7 @@ use crate::support::endpoint::{Answer, MockEndpoint};
 #[cfg(unix)]
 use crate::support::process::{signal, wait_until};
 use crate::support::run::{Bench, Called, model_args, records, words};
+use crate::support::snapshot::{lines_with, redacted};
 use crate::support::table::{check_rows, check_rows_at_once};
 
 const PRICES: &str = "as-of = \"2026-01-01\"\nbatch = 0.5\n[models]\nm = { input = 1000, output = 0, image-tokens = 70 }\n";
@@ -25,14 +26,17 @@ fn args<'a>(base: &'a str, more: &'a str) -> Vec<&'a str> {
 }
 
 #[test]
-fn a_dry_run_sends_nothing_and_leaves_nothing() {
+fn dry_run_sends_and_writes_nothing() {
     let bench = Bench::with_questions(3);
     let mock = MockEndpoint::start([Answer::text("C")]);
     let base = mock.base_url();
     let dry = args(&base, "--out run --dry-run");
     let table = bench.complete(&dry);
-    assert!(table.contains("3 of 3 trials are left to ask"), "{table}");
-    assert!(table.contains("unknown"), "no price, no family: {table}");
+    insta::assert_snapshot!(lines_with(&table, "trials"), @"Nothing was sent. 3 of 3 trials are left to ask.");
+    insta::assert_snapshot!(lines_with(&table, "unknown"), @"
+     m              3           112        unknown     12 – 3,072   unknown
+    unknown: state the price of a model and its image-tokens in a table of --prices FILE
+    ");
     assert!(mock.requests().is_empty());
     assert!(!bench.path("run").exists());
 
@@ -56,11 +60,17 @@ fn a_dry_run_sends_nothing_and_leaves_nothing() {
     // What is answered is not counted again.
     bench.complete(&args(&base, "--out run --limit 3"));
     let table = bench.complete(&args(&base, "--out run --limit 3 --dry-run"));
-    assert!(table.contains("0 of 3 trials are left to ask"), "{table}");
+    insta::assert_snapshot!(redacted(&table), @"
+    Nothing was sent. 0 of 3 trials are left to ask.
+    power: 3 questions detects no difference between two conditions; 5 points need about 794 questions (one model;
+        level 3.33 % after correction; assumed: 20 % of answers change without an effect, correlation 0.05 in a
+        question)
+    only 1 frame (8 are needed): intervals and tests would be rough
+    ");
 }
 
 #[test]
-fn a_run_stops_before_it_costs_too_much_and_goes_on_with_more() {
+fn budget_stops_run_until_raised() {
     let bench = Bench::with_questions(12);
     bench.file("prices.toml", PRICES);
     // 90 tokens of prompt and 1 of reply: 9 cents each.
@@ -71,15 +81,15 @@ fn a_run_stops_before_it_costs_too_much_and_goes_on_with_more() {
         bench.call(&args(&base, &more))
     };
     let stopped = call("0.5");
-    assert_eq!(stopped.code, Some(3), "{stopped:?}");
-    assert!(stopped.stderr.contains("--max-cost"), "{stopped:?}");
-    assert!(
-        stopped
-            .stdout
-            .contains("over budget: 5 of 12 trials answered"),
-        "{}",
-        stopped.stdout
-    );
+    insta::assert_snapshot!(stopped.messages(), @"
+    exit code: 3
+     WARN stopped: one more question could exceed the $0.5000 of --max-cost; the same command with a higher limit
+        continues
+    ");
+    insta::assert_snapshot!(stopped.lines_with("over budget"), @"
+    exit code: 3
+    ! run: over budget: 5 of 12 trials answered, 0 failed. The same command asks the
+    ");
     let again = call("0.5");
     assert_eq!(
         (again.code, mock.requests().len()),
@@ -95,8 +105,11 @@ fn a_run_stops_before_it_costs_too_much_and_goes_on_with_more() {
 fn a_limit_needs_a_price() {
     let bench = Bench::with_questions(1);
     let refused = bench.call(&args("http://127.0.0.1:9/v1", "--max-cost 1"));
-    assert_eq!(refused.code, Some(2));
-    assert!(refused.stderr.contains("--prices FILE"), "{refused:?}");
+    insta::assert_snapshot!(refused.messages(), @"
+    exit code: 2
+    error: --max-cost: the price of m is not in the table of [DATE]; add it to your own table and name that with
+        --prices FILE, or set price in a file of models
+    ");
     check_rows(["0", "-1", "NaN"], |wrong| {
         let flag = format!("--max-cost={wrong}");
         assert_eq!(
@@ -107,21 +120,21 @@ fn a_limit_needs_a_price() {
 }
 
 #[test]
-fn an_image_beyond_the_limit_is_found_before_anything_is_asked() {
+fn oversized_image_is_found_early() {
     let bench = Bench::with_questions(2);
     let mock = MockEndpoint::start([Answer::text("C")]);
     let base = mock.base_url();
     let refused = bench.call(&args(&base, "--max-image 0.00005"));
-    assert_eq!(refused.code, Some(2), "{refused:?}");
-    assert!(
-        refused.stderr.contains("frame") && refused.stderr.contains("--image max-side"),
-        "{refused:?}"
-    );
+    insta::assert_snapshot!(refused.messages(), @"
+    exit code: 2
+    error: frame a.png at L0: 64 × 48 pixels are 0.0 MB as png, more than the 0.00005 MB of --image max-mb; make
+        it smaller with --image max-side=N, or with --image jpeg:95, or set another limit with --image max-mb
+    ");
     assert!(mock.requests().is_empty());
 }
 
 #[test]
-fn the_estimate_is_corrected_by_what_prompts_are_charged() {
+fn charged_prompts_correct_estimate() {
     let bench = Bench::with_questions(20);
     bench.file("prices.toml", PRICES);
     let mock = MockEndpoint::start([Answer::message_charged("C", 900)]);
@@ -173,7 +186,7 @@ fn dollars(replies: u64) -> f64 {
     (100 + replies * 100) as f64 / 1e6
 }
 
-/// A reply that is charged so many tokens; `usage` changes what is stated of them.
+/// A reply charged `tokens` tokens; `usage` changes the stated counts.
 fn charged(tokens: u64, usage: &Value) -> Answer {
     let mut body = json!({
         "choices": [{"message": {"content": "C"}, "finish_reason": "stop"}],
@@ -218,9 +231,9 @@ fn limited(
     (called, cost)
 }
 
-/// What a server may charge for without a word, with short and long replies in any order.
+/// Silent charges of a server, with short and long replies in any order.
 #[test]
-fn a_limit_holds_whatever_is_charged_for() {
+fn limit_holds_whatever_is_charged_for() {
     type Answers = fn(u64) -> (Answer, u64);
     let rows: [(&str, Answers, f64); 9] = [
         (
@@ -371,7 +384,7 @@ fn replies_beyond_their_limit_are_said() {
 
 /// Without a token limit the cost has no bound, which is said before anything is sent.
 #[test]
-fn a_limit_without_a_token_limit_is_no_bound() {
+fn cost_limit_needs_token_limit() {
     for more in [
         "--token-field none",
         "--extra-body {\"google\":{\"thinking_config\":{\"thinking_budget\":-1}}}",
@@ -438,7 +451,7 @@ fn billed(usage: &Value) -> Answer {
 }
 
 #[test]
-fn the_bill_is_that_of_the_vendors() {
+fn bill_is_that_of_vendors() {
     // By hand, in dollars: the tokens of the prompt by 1,000 and those of the reply by 100.
     let vendors = [
         // OpenAI: reasoning within the reply.
@@ -503,7 +516,7 @@ fn the_bill_is_that_of_the_vendors() {
 }
 
 #[test]
-fn the_cost_of_attempts_without_a_reply_is_in_the_report() {
+fn report_counts_cost_of_failures() {
     let bench = Bench::with_questions(1);
     let usage = json!({"prompt_tokens": 1000, "completion_tokens": 100});
     let empty = Answer::json(200, &json!({"model": "m", "choices": [], "usage": usage}));
@@ -518,7 +531,7 @@ fn the_cost_of_attempts_without_a_reply_is_in_the_report() {
 }
 
 #[test]
-fn the_report_has_the_prices_that_the_run_had() {
+fn report_has_prices_that_run_had() {
     let bench = Bench::with_questions(1);
     let usage = json!({"prompt_tokens": 1000, "completion_tokens": 100});
     let mock = MockEndpoint::start([billed(&usage)]);
@@ -530,10 +543,19 @@ fn the_report_has_the_prices_that_the_run_had() {
         before[before.len() - 40..].to_owned()
     };
     let printed = bench.complete(&args(&base, "--out run --prices prices.toml"));
-    assert!(
-        printed.contains("cost: $1.00 at the prices of 2026-01-01"),
-        "{printed}"
-    );
+    insta::assert_snapshot!(redacted(&printed), @"
+    m · 1 question · 1 frame · 1 reply, 0 failed · intervals by question
+    ! Only 1 question (8 are needed): intervals and tests are rough.
+
+     accuracy in %
+     m            L0   95 %
+     untouched 100.0   −79.3 0.0
+     95 %: how far the widest interval of the row reaches down and up
+     chance 33.3
+    run: run
+    cost: $1.00 at the prices of [DATE] of --prices
+    report: run/report.html
+    ");
     let stated = cost();
     assert!(
         stated.ends_with("$1.00 at the prices of 2026-01-01"),
@@ -546,7 +568,9 @@ fn the_report_has_the_prices_that_the_run_had() {
     // The same run goes on with these prices, and says so where they are a limit.
     let limited = bench.call(&args(&base, "--out run --max-cost 5"));
     assert_eq!(limited.code, Some(0), "{limited:?}");
-    let note = "the prices that the run folder keeps";
-    assert!(limited.stderr.contains(note), "{limited:?}");
+    insta::assert_snapshot!(limited.messages(), @"
+    exit code: 0
+     WARN --max-cost counts with the prices that the run folder keeps; --prices FILE names others
+    ");
     assert_eq!(cost(), stated);
 }

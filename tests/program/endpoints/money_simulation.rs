@@ -211,7 +211,7 @@ fn a_limit_holds_for_random_servers() {
 #[test]
 #[ignore = "slow"]
 #[expect(clippy::print_stdout, reason = "the result of the simulation")]
-fn a_limit_holds_for_200_random_servers() {
+fn limit_holds_for_200_random_servers() {
     let mut shares = Vec::new();
     for seed in 1..=200 {
         let (share, is_over) = simulate(Setting::new(seed));

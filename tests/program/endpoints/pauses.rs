@@ -57,7 +57,7 @@ impl Reply {
 }
 
 #[test]
-fn pauses_longer_than_the_timeout_cost_nothing() {
+fn pauses_longer_than_timeout_cost_nothing() {
     check_rows([Reply::Whole, Reply::Dripping, Reply::Stream], |reply| {
         let bench = Bench::with_questions(6);
         let endpoint = reply.endpoint();
@@ -81,7 +81,7 @@ fn pauses_longer_than_the_timeout_cost_nothing() {
 }
 
 #[test]
-fn a_pause_after_an_interrupt_loses_no_reply() {
+fn pause_after_interrupt_loses_no_reply() {
     let bench = Bench::with_questions(6);
     let endpoint = Reply::Whole.endpoint();
     let url = endpoint.base_url();
@@ -99,7 +99,7 @@ fn a_pause_after_an_interrupt_loses_no_reply() {
 }
 
 #[test]
-fn a_server_that_stays_silent_still_runs_out_of_time() {
+fn silent_server_times_out() {
     check_rows([Answer::silent(), Answer::stuck()], |answer| {
         let bench = Bench::with_questions(1);
         let endpoint = MockEndpoint::start([answer]);

@@ -10,6 +10,7 @@ use serde_json::{Value, json};
 
 use crate::support::endpoint::{Answer, MockEndpoint, Request};
 use crate::support::run::{Bench, model_args, records, words};
+use crate::support::snapshot::lines_with;
 
 /// A folder with three pictures and `set.json`: a question with two marks, one without marks, and one about a single picture.
 fn bench() -> Bench {
@@ -63,30 +64,26 @@ fn mean(picture: &RgbImage) -> f64 {
 }
 
 #[test]
-fn all_images_of_a_row_are_sent_in_one_request() {
+fn row_images_share_one_request() {
     let bench = bench();
     let endpoint = MockEndpoint::start([Answer::text("A")]);
     let url = endpoint.base_url();
     let line = "--data set.json --levels L0,L3 --blind-model m --out run";
     let refused = bench.call(&model_args(&url, line));
-    assert_eq!(refused.code, Some(2));
-    assert!(
-        refused
-            .stderr
-            .contains("--multi-image send shows all of them in one request"),
-        "{}",
-        refused.stderr
-    );
+    insta::assert_snapshot!(refused.messages(), @"
+    exit code: 2
+    error: set.json: 2 of 3 rows show 2 images; --multi-image skip leaves them out, --multi-image send shows all
+        of them in one request
+    ");
     let line = format!("{line} --multi-image send");
     let called = bench.call(&model_args(&url, &line));
-    assert_eq!(called.code, Some(0), "{called:?}");
-    assert!(
-        called
-            .stderr
-            .contains("2 questions show 2 to 3 images, all in one request"),
-        "{}",
-        called.stderr
-    );
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 0
+    set: 3 questions on 3 images in 1 family (no column of families)
+    question = question, image = image (files 3), options = options, answer = answer (text), id = id
+    2 questions show 2 to 3 images, all in one request: each at its mark (<image 2>) in the text, else in order
+        beside it
+    ");
     let bodies: Vec<Value> = endpoint.requests().iter().map(Request::json).collect();
     // Three questions: without an image, at L0, and at L3 in two variants.
     assert_eq!(bodies.len(), 12);
@@ -145,10 +142,7 @@ fn all_images_of_a_row_are_sent_in_one_request() {
 /// `show` makes the very files again, all of them, and a picture of all; the page has them.
 fn images_are_made_again(bench: &Bench) {
     let shown = bench.complete(&words("show run three"));
-    assert!(
-        shown.contains("about 3 images: a.png, b.png, c.png"),
-        "{shown}"
-    );
+    insta::assert_snapshot!(lines_with(&shown, "images: "), @"three, about 3 images: a.png, b.png, c.png");
     assert_eq!(
         shown.matches("the same bytes as were sent").count(),
         3,
@@ -180,14 +174,16 @@ fn images_are_made_again(bench: &Bench) {
         .save(bench.path("b.png"))
         .unwrap();
     let called = bench.call(&words("show run two"));
-    assert!(
-        called.stdout.contains("NOT the bytes that were sent"),
-        "{called:?}"
-    );
+    insta::assert_snapshot!(called.lines_with("bytes"), @"
+    exit code: 1
+    L0: NOT the bytes that were sent: [DIGEST] now
+    L3-ev: NOT the bytes that were sent: [DIGEST] now
+    L3-noise: NOT the bytes that were sent: [DIGEST] now
+    ");
 }
 
 #[test]
-fn an_image_has_its_own_noise_wherever_it_is_shown() {
+fn noise_is_independent_of_position() {
     let bench = bench();
     let endpoint = MockEndpoint::start([Answer::text("A")]);
     let url = endpoint.base_url();
@@ -220,11 +216,15 @@ fn what_shows_one_image_refuses_several() {
     let called = bench.call(&words(
         "export llava set.json --out sets --levels L0 --multi-image send",
     ));
-    assert_eq!(called.code, Some(2));
-    assert!(
-        called.stderr.contains("shows 2 images") && called.stderr.contains("--multi-image skip"),
-        "{called:?}"
-    );
+    insta::assert_snapshot!(called.messages(), @r#"
+    exit code: 2
+    set: 3 questions on 3 images in 1 family (no column of families)
+    question = question, image = image (files 3), options = options, answer = answer (text), id = id
+    2 questions show 2 to 3 images, all in one request: each at its mark (<image 2>) in the text, else in order
+        beside it
+    error: --multi-image: the question "two" shows 2 images, and an exported set has one image per question;
+        --multi-image skip leaves such rows out
+    "#);
     let called = bench.call(&words(
         "--data set.json --model observer --levels L0 --multi-image send",
     ));

@@ -4,6 +4,7 @@ use serde_json::{Value, json};
 
 use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::run::{Bench, Called, model_args, records, words};
+use crate::support::snapshot::redacted;
 
 /// An endpoint whose model needs more than 64 tokens for the first four questions.
 fn thinking() -> MockEndpoint {
@@ -30,7 +31,7 @@ fn summary(bench: &Bench) -> Value {
 }
 
 #[test]
-fn a_larger_limit_asks_only_truncated_replies_again() {
+fn larger_limit_repeats_truncated_only() {
     let (bench, mock) = (Bench::with_questions(10), thinking());
     let first = call(&bench, &mock, "--max-tokens 64");
     assert_eq!((first.code, mock.requests().len()), (Some(0), 10));
@@ -43,19 +44,20 @@ fn a_larger_limit_asks_only_truncated_replies_again() {
         (Some(0), 14),
         "{grown:?}"
     );
-    assert!(
-        grown
-            .stderr
-            .contains("4 truncated replies are asked again with the larger --max-tokens"),
-        "{grown:?}"
-    );
+    insta::assert_snapshot!(grown.messages(), @"
+    exit code: 0
+    4 truncated replies are asked again with the larger --max-tokens
+    ");
     let limits = |limit: Option<u64>| {
         let records = records(&bench.path("run"));
         let of_limit = |record: &&Value| record["max_tokens"].as_u64() == limit;
         records.iter().filter(of_limit).count()
     };
     assert_eq!((limits(None), limits(Some(512))), (10, 4));
-    assert!(grown.stdout.contains("100.0"), "{}", grown.stdout);
+    insta::assert_snapshot!(grown.lines_with("100.0"), @"
+    exit code: 0
+    untouched 100.0   −27.8 0.0
+    ");
     let alerts = summary(&bench)["alerts"].to_string();
     assert!(
         alerts.contains("6 replies with 64, 4 replies with 512"),
@@ -70,7 +72,7 @@ fn a_larger_limit_asks_only_truncated_replies_again() {
 }
 
 #[test]
-fn a_reply_truncated_twice_is_asked_with_each_larger_limit() {
+fn twice_truncated_reply_is_repeated() {
     let bench = Bench::with_questions(3);
     let mock = MockEndpoint::start([Answer::message(&json!({"content": "Let me"}), "length")]);
     for (limit, requests) in [(64, 3), (64, 3), (128, 6), (128, 6), (256, 9)] {
@@ -80,7 +82,7 @@ fn a_reply_truncated_twice_is_asked_with_each_larger_limit() {
 }
 
 #[test]
-fn a_failure_does_not_replace_a_truncated_reply() {
+fn failure_does_not_replace_truncated_reply() {
     let bench = Bench::with_questions(2);
     let cut = Answer::message(&json!({"content": "It is B. Let me"}), "length");
     let refused = Answer::error(400, "x", "no");
@@ -98,10 +100,19 @@ fn another_smaller_limit_is_another_run() {
     let (bench, mock) = (Bench::with_questions(2), thinking());
     call(&bench, &mock, "--max-tokens 512");
     let smaller = call(&bench, &mock, "--max-tokens 64");
-    assert_eq!(smaller.code, Some(2), "{smaller:?}");
-    assert!(smaller.stderr.contains("--max-tokens"), "{smaller:?}");
+    insta::assert_snapshot!(smaller.messages(), @"
+    exit code: 2
+    error: run: the model m has another --max-tokens in this run: it was 512, now it is 64; use another --out, or
+        the same --max-tokens
+    ");
     let dry = model_words(&bench, &mock, "--max-tokens 1024 --dry-run");
-    assert!(dry.contains("0 of 2 trials are left to ask"), "{dry}");
+    insta::assert_snapshot!(redacted(&dry), @"
+    Nothing was sent. 0 of 2 trials are left to ask.
+    power: 2 questions detects no difference between two conditions; 5 points need about 794 questions (one model;
+        level 3.33 % after correction; assumed: 20 % of answers change without an effect, correlation 0.05 in a
+        question)
+    only 1 frame (8 are needed): intervals and tests would be rough
+    ");
 }
 
 fn model_words(bench: &Bench, mock: &MockEndpoint, more: &str) -> String {

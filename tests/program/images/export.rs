@@ -5,6 +5,7 @@ use std::path::Path;
 use std::process::Command;
 
 use crate::support::run::{Called, PROGRAM, called};
+use crate::support::snapshot::redacted;
 use crate::support::table::check_rows;
 use darkqa_eval::internals::dataset::{DataPlace, Dataset, SetArgs};
 use darkqa_ground::types::{Question, Rgb, Severity};
@@ -137,7 +138,7 @@ fn a_table_holds_each_image_once() {
 }
 
 #[test]
-fn the_noise_is_that_of_an_evaluation() {
+fn noise_is_that_of_evaluation() {
     let (data, out, dark) = (
         data(),
         tempfile::tempdir().unwrap(),
@@ -178,9 +179,9 @@ fn nothing_is_written_over_unasked() {
     let message = run(data.path(), "llava", out.path(), &flags)
         .ended(2)
         .stderr;
-    assert!(
-        message.contains("questions.jsonl: the set exists already; --force"),
-        "{message}"
+    insta::assert_snapshot!(
+        redacted(&message),
+        @"error: [TMP]/L0/questions.jsonl: the set exists already; --force overwrites it, another --out keeps both"
     );
     run(
         data.path(),
@@ -192,10 +193,8 @@ fn nothing_is_written_over_unasked() {
     let message = run(data.path(), "parquet", out.path(), &flags)
         .ended(2)
         .stderr;
-    assert!(
-        message.contains(
-            "invalid value 'parquet' for '<KIND>' [possible values: vlmevalkit, imagefolder, llava"
-        ),
-        "{message}"
+    insta::assert_snapshot!(
+        redacted(&message),
+        @"error: invalid value 'parquet' for '<KIND>' [possible values: vlmevalkit, imagefolder, llava]"
     );
 }

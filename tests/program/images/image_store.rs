@@ -9,13 +9,14 @@ use serde_json::Value;
 use crate::support::house::House;
 use crate::support::onnx;
 use crate::support::run::{Bench, Called, assert_same_products, called, files, records, words};
+use crate::support::snapshot::redacted;
 
 /// Three frames in four enhanced images each.
 const IMAGES: usize = 3 * 4;
 
-/// What is said of an enhancer of which the store has all images.
+/// Message for an enhancer whose images are all in the store.
 const NOT_OPENED: &str = "one: not opened, because the store has all its images";
-/// What is said when one of them is damaged.
+/// Message when a stored image is damaged.
 const OPENED: &str = "one: opened, because the store lacks an image";
 
 /// A run about small rooms with an enhancer; `--timings` says what the store gave.
@@ -101,23 +102,27 @@ fn stored_as(bench: &Bench, content: &str) -> Vec<PathBuf> {
 }
 
 #[test]
-fn a_second_model_takes_the_images_of_the_first_and_all_is_as_without() {
+fn second_model_reuses_stored_images() {
     let bench = bench();
     evaluate(&bench, "random", "--out random-alone");
     evaluate(&bench, "observer", "--out observer-alone");
     let first = evaluate(&bench, "random", "--images-cache images --out random");
-    let none = format!("image store images: 0 of {IMAGES} images read");
-    assert!(first.stderr.contains(&none), "{}", first.stderr);
+    insta::assert_snapshot!(first.messages(), @"
+    exit code: 0
+    image store images: 0 of 12 images read (0.0 MB), 0 measures and small copies; these took [TIME] to make; 12
+        written (0.1 MB); it holds 0.00 of [MEMORY]
+    ");
     assert_eq!(stored(&bench).len(), IMAGES);
     assert!(!first.stderr.contains(NOT_OPENED), "{}", first.stderr);
     let second = evaluate(&bench, "observer", "--images-cache images --out observer");
-    assert!(second.stderr.contains(NOT_OPENED), "{}", second.stderr);
+    insta::assert_snapshot!(second.messages(), @"
+    exit code: 0
+    DEBUG one: not opened, because the store has all its images
+    image store images: 12 of 12 images read (0.1 MB), 37 measures and small copies; these took [TIME] to make; 0
+        written (0.0 MB); it holds 0.00 of [MEMORY]
+    ");
     assert!(!second.stderr.contains(OPENED), "{}", second.stderr);
     // Measures of the degraded images, small copies of all, and what the enhancer was found to be.
-    let measures = format!("{} measures and small copies", 3 * IMAGES + 1);
-    assert!(second.stderr.contains(&measures), "{}", second.stderr);
-    let all = format!("image store images: {IMAGES} of {IMAGES} images read");
-    assert!(second.stderr.contains(&all), "{}", second.stderr);
     assert_same(&bench, ["random-alone", "random"]);
     assert_same(&bench, ["observer-alone", "observer"]);
 
@@ -135,11 +140,15 @@ fn a_second_model_takes_the_images_of_the_first_and_all_is_as_without() {
     }
     onnx::gamma(0.6).write(&bench.path(""), "one.onnx");
     let other = evaluate(&bench, "random", "--images-cache images --out another-file");
-    assert!(other.stderr.contains(&none), "{}", other.stderr);
+    insta::assert_snapshot!(other.messages(), @"
+    exit code: 0
+    image store images: 0 of 12 images read (0.0 MB), 24 measures and small copies; these took [TIME] to make; 12
+        written (0.1 MB); it holds 0.00 of [MEMORY]
+    ");
 }
 
 #[test]
-fn damaged_and_exchanged_images_are_made_again_and_counted() {
+fn damaged_stored_images_are_rebuilt() {
     let bench = bench();
     evaluate(&bench, "random", "--images-cache images --out first");
     let entries = stored(&bench);
@@ -152,25 +161,26 @@ fn damaged_and_exchanged_images_are_made_again_and_counted() {
     fs::write(&entries[2], three).unwrap();
     fs::write(&entries[3], two).unwrap();
     let again = evaluate(&bench, "random", "--images-cache images --out again");
-    let read = format!("{} of {IMAGES} images read", IMAGES - 4);
-    for said in [
-        &read,
-        "4 damaged and made again",
-        "4 written",
-        "is damaged",
-        NOT_OPENED,
-        OPENED,
-    ] {
-        assert!(again.stderr.contains(said), "{said}: {}", again.stderr);
-    }
+    insta::assert_snapshot!(again.messages(), @"
+    exit code: 0
+    DEBUG one: not opened, because the store has all its images
+     WARN --images-cache: images/v1/[DIGEST].img is damaged, and made again; so is each further one
+    DEBUG one: opened, because the store lacks an image
+    image store images: 8 of 12 images read (0.1 MB), 37 measures and small copies; these took [TIME] to make; 4
+        written (0.0 MB), 4 damaged and made again; it holds 0.00 of [MEMORY]
+    ");
     assert_same(&bench, ["first", "again"]);
     let third = evaluate(&bench, "random", "--images-cache images --out third");
-    let read = format!("{IMAGES} of {IMAGES} images read");
-    assert!(third.stderr.contains(&read), "{}", third.stderr);
+    insta::assert_snapshot!(third.messages(), @"
+    exit code: 0
+    DEBUG one: not opened, because the store has all its images
+    image store images: 12 of 12 images read (0.1 MB), 37 measures and small copies; these took [TIME] to make; 0
+        written (0.0 MB); it holds 0.00 of [MEMORY]
+    ");
 }
 
 #[test]
-fn an_enhancer_is_opened_if_an_image_is_missing_and_tried_again_on_other_frames() {
+fn missing_image_opens_the_enhancer() {
     let bench = bench();
     evaluate(&bench, "random", "--images-cache images --out first");
     fs::remove_file(&stored(&bench)[0]).unwrap();
@@ -190,16 +200,16 @@ fn an_enhancer_is_opened_if_an_image_is_missing_and_tried_again_on_other_frames(
     // Measures that are lost are measured again.
     fs::remove_dir_all(bench.path("images")).unwrap();
     let lost = evaluate(&bench, "random", "--images-cache images --out lost");
-    assert!(
-        lost.stderr.contains("0 measures and small copies"),
-        "{}",
-        lost.stderr
-    );
+    insta::assert_snapshot!(lost.messages(), @"
+    exit code: 0
+    image store images: 0 of 12 images read (0.0 MB), 0 measures and small copies; these took [TIME] to make; 12
+        written (0.1 MB); it holds 0.00 of [MEMORY]
+    ");
     assert_same(&bench, ["first", "lost"]);
 }
 
 #[test]
-fn an_enhancer_that_is_refused_is_refused_with_its_images_in_the_store() {
+fn refused_enhancer_ignores_stored_images() {
     let bench = Bench::new();
     bench.rooms("frames", 3, "96x64");
     onnx::gamma(0.0).write(&bench.path(""), "one.onnx");
@@ -213,22 +223,45 @@ fn an_enhancer_that_is_refused_is_refused_with_its_images_in_the_store() {
     }
     let refused = bench.call(&words(&format!("{line} --out refused")));
     assert_ne!(refused.code, Some(0), "{refused:?}");
-    assert!(refused.stderr.contains(problem), "{}", refused.stderr);
+    insta::assert_snapshot!(refused.messages(), @"
+    exit code: 2
+    error: one.onnx: on 6 of 6 dark frames its images are flat (brightness varies by 0.0 of 255). No usual value
+        range fits (0..1, 0..255, -1..1, -0.5..0.5, mean and std of ImageNet or CLIP); perhaps it needs another
+        `mean` and `std`, another output is the image, or the export has lost its weights. `darkqa-eval enhance
+        doctor one.onnx IMAGES… --out DIR` tries each value range and colour order; --allow bad-enhancer uses it
+        anyway
+    ");
 }
 
 #[test]
-fn a_dry_run_says_how_many_images_find_room_and_makes_no_store() {
+fn dry_run_estimates_image_store() {
     let bench = bench();
     let line = "--model random --data frames --levels L3,L5 --llie one.onnx --llie-anyway --dry-run --out run";
     let without = bench.complete(&words(line));
     assert!(!without.contains("image store"), "{without}");
     let roomy = bench.complete(&words(&format!("{line} --images-cache images")));
     let all = "the next model finds about 100 % of them";
-    assert!(roomy.contains(all), "{roomy}");
+    insta::assert_snapshot!(redacted(&roomy), @"
+    Nothing was sent. 60 of 60 trials are left to ask.
+    at no endpoint, built in: random 60
+    image store: enhanced images 0.1 MB, room [MEMORY]: the next model finds about 100 % of them
+    power: 10 questions in 3 frames detects no difference between two conditions; 5 points need about 372 frames
+        (one model; level 0.83 % after correction; assumed: 20 % of answers change without an effect, correlation
+        0.05 in a frame)
+    only 3 frames (8 are needed): intervals and tests would be rough
+    ");
     let narrow = bench.complete(&words(&format!(
         "{line} --images-cache images --images-cache-size 0.00001"
     )));
-    assert!(narrow.contains("image store: enhanced images"), "{narrow}");
+    insta::assert_snapshot!(redacted(&narrow), @"
+    Nothing was sent. 60 of 60 trials are left to ask.
+    at no endpoint, built in: random 60
+    image store: enhanced images 0.1 MB, room 0.0 MB: the next model finds about 19 % of them
+    power: 10 questions in 3 frames detects no difference between two conditions; 5 points need about 372 frames
+        (one model; level 0.83 % after correction; assumed: 20 % of answers change without an effect, correlation
+        0.05 in a frame)
+    only 3 frames (8 are needed): intervals and tests would be rough
+    ");
     assert!(!narrow.contains(all), "{narrow}");
     assert!(!bench.path("images").exists());
 }
@@ -257,7 +290,7 @@ fn shards_try_an_enhancer_once() {
 }
 
 #[test]
-fn two_processes_share_a_store_that_a_command_lists_and_empties() {
+fn processes_share_one_image_store() {
     let bench = bench();
     std::thread::scope(|scope| {
         for model in ["random", "observer"] {
@@ -280,15 +313,13 @@ fn two_processes_share_a_store_that_a_command_lists_and_empties() {
     assert!(listed.contains("in all, in images"), "{listed}");
     let foreign = bench.file("images/v1/notes.txt", "mine");
     let cleared = bench.complete(&words("cache images --clear"));
-    assert!(cleared.contains("files removed"), "{cleared}");
+    insta::assert_snapshot!(redacted(&cleared), @"images: 50 files removed (0.4 MB)");
     assert!(stored(&bench).is_empty() && foreign.exists());
     let called = bench.call(&words("cache elsewhere"));
-    assert_eq!(called.code, Some(2));
-    assert!(
-        called.stderr.contains("no image store"),
-        "{}",
-        called.stderr
-    );
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 2
+    error: elsewhere: no image store: the folder that --images-cache named is expected
+    ");
 }
 
 #[test]
@@ -308,15 +339,25 @@ fn walks_share_their_images_too() {
     ask("--out alone");
     // The first frames of both walks are alike, so without noise they are one image.
     let first = ask("--images-cache images --out first");
-    assert!(
-        first.contains("image store images: 1 of 10 images read"),
-        "{first}"
-    );
+    insta::assert_snapshot!(redacted(&first), @"
+     WARN 1 of 2 walks has fewer frames than --num-frames 3: they are shown several times in a request, as
+        upstream does (the 2 frames of scannet-v0/001-b, for example)
+     WARN one: on 4 of 6 dark frames its images are flat (brightness varies by 0.0 of 255). No usual value range
+        fits (0..1, 0..255, -1..1, -0.5..0.5, mean and std of ImageNet or CLIP); perhaps it needs another `mean`
+        and `std`, another output is the image, or the export has lost its weights
+    image store images: 1 of 10 images read (0.0 MB), 0 measures and small copies; these took [TIME] to make; 9
+        written (0.0 MB); it holds 0.00 of [MEMORY]
+    ");
     let second = ask("--images-cache images --out second");
-    assert!(
-        second.contains("image store images: 10 of 10 images read"),
-        "{second}"
-    );
+    insta::assert_snapshot!(redacted(&second), @"
+     WARN 1 of 2 walks has fewer frames than --num-frames 3: they are shown several times in a request, as
+        upstream does (the 2 frames of scannet-v0/001-b, for example)
+     WARN one: on 4 of 6 dark frames its images are flat (brightness varies by 0.0 of 255). No usual value range
+        fits (0..1, 0..255, -1..1, -0.5..0.5, mean and std of ImageNet or CLIP); perhaps it needs another `mean`
+        and `std`, another output is the image, or the export has lost its weights
+    image store images: 10 of 10 images read (0.0 MB), 1 measures and small copies; these took [TIME] to make; 0
+        written (0.0 MB); it holds 0.00 of [MEMORY]
+    ");
     for run in ["first", "second"] {
         let [alone, run] = ["alone", run].map(|run| house.0.path(run));
         assert_eq!(untimed(&alone), untimed(&run));

@@ -13,7 +13,7 @@ const LIGHT: &str = "--profile all --variant all --levels L0,L2,9,T33.33 --seed 
 /// Conditions of `LIGHT`: L0, and by level exposure drop alone, four readings of noise, automatic exposure; and a motion blur.
 const CONDITIONS: usize = 1 + 2 * 6 + 1;
 
-/// A random model about frames of which the rooms know the camera.
+/// Random answers about room frames with a known camera.
 fn evaluate(bench: &Bench, more: &str) {
     bench.complete(&words(&format!(
         "--model random --data rooms:frames=3,size=96x64 {more}"
@@ -32,7 +32,7 @@ fn sent(run: &Path) -> BTreeMap<String, BTreeSet<String>> {
 }
 
 #[test]
-fn threads_parts_and_readings_added_later_change_no_byte() {
+fn threads_and_shards_keep_bytes() {
     let bench = Bench::new();
     evaluate(&bench, &format!("{LIGHT} --threads 1 --out whole"));
     let whole = bench.path("whole");
@@ -70,7 +70,7 @@ fn threads_parts_and_readings_added_later_change_no_byte() {
 }
 
 #[test]
-fn files_of_images_are_what_models_are_sent_and_are_made_again_alone() {
+fn image_files_match_sent_images() {
     let bench = Bench::new();
     evaluate(&bench, &format!("{LIGHT} --out run"));
     bench.complete(&words("rooms --out rooms --frames 3 --size 96x64"));

@@ -4,6 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use crate::support::run::{Bench, words};
+use crate::support::snapshot::each;
 use crate::support::table::check_rows;
 use serde_json::{Value, json};
 
@@ -49,7 +50,7 @@ fn files_are_what_an_evaluation_sends() {
 
 /// Free drops of light and two readings at once: exposure has no readings, and each noisy image has the name of its own.
 #[test]
-fn any_drop_and_several_readings_are_made() {
+fn any_drop_and_profile_is_made() {
     let bench = Bench::new();
     frames(&bench);
     let light = ["--levels", "L0,3.3", "--profile", "paper,eld"];
@@ -70,16 +71,14 @@ fn any_drop_and_several_readings_are_made() {
         ]
         .concat(),
     );
-    assert_eq!(refused.code, Some(2), "{refused:?}");
-    assert!(
-        refused
-            .stderr
-            .contains("--noise tone: cannot be combined with several profiles")
-    );
+    insta::assert_snapshot!(refused.messages(), @"
+    exit code: 2
+    error: --noise tone: cannot be combined with several profiles; name one in --profile
+    ");
 }
 
 #[test]
-fn what_is_there_is_kept_unless_it_is_another() {
+fn existing_images_stay_unless_different() {
     let bench = Bench::new();
     frames(&bench);
     let call = |more: &[&str]| {
@@ -101,22 +100,17 @@ fn what_is_there_is_kept_unless_it_is_another() {
         other.stdout,
         "out: 0 made of 1 frame, 1 left as they were (--force makes them again), 1 failed\n"
     );
-    assert!(
-        other.stderr.contains(
-            "a_L2-noise.png: made with --seed 0, now 1; --force overwrites it, another --out keeps both"
-        ),
-        "{}",
-        other.stderr
-    );
+    insta::assert_snapshot!(other.messages(), @"
+    exit code: 1
+    ERROR out/a_L2-noise.png: made with --seed 0, now 1; --force overwrites it, another --out keeps both
+    ");
     assert_eq!(at_two_levels("").code, Some(0));
     let other = at_two_levels("--noise gain=2");
-    assert!(
-        other
-            .stderr
-            .contains("made with another --noise camera, gain, ratio or fixed; --force"),
-        "{}",
-        other.stderr
-    );
+    insta::assert_snapshot!(other.messages(), @"
+    exit code: 1
+    ERROR out/a_L2-noise.png and 1 more: made with another --noise camera, gain, ratio or fixed; --force
+        overwrites it, another --out keeps both
+    ");
     let other = at_two_levels("--seed 9");
     let lines: Vec<&str> = other.stderr.lines().collect();
     assert!(
@@ -151,7 +145,7 @@ fn encoded_again(path: &Path) -> Vec<u8> {
 }
 
 #[test]
-fn a_json_file_vouches_for_the_bytes_of_its_image() {
+fn json_file_verifies_image_bytes() {
     let bench = Bench::new();
     frames(&bench);
     let call = |more: &str| {
@@ -174,11 +168,10 @@ fn a_json_file_vouches_for_the_bytes_of_its_image() {
     fs::write(&image, &written[..written.len() / 2]).unwrap();
     let again = call("");
     assert_eq!(again.stdout, "out: 1 made of 1 frame\n");
-    assert!(
-        again
-            .stderr
-            .contains("a_L2-ev.png: cut or damaged; it is made again")
-    );
+    insta::assert_snapshot!(again.messages(), @"
+    exit code: 0
+     WARN out/a_L2-ev.png: cut or damaged; it is made again
+    ");
     assert_eq!(fs::read(&image).unwrap(), written);
 
     // The same pixels from another encoder: kept, and the JSON file vouches for the new bytes.
@@ -192,12 +185,11 @@ fn a_json_file_vouches_for_the_bytes_of_its_image() {
     let edited = as_jpeg(&image);
     fs::write(&image, &edited).unwrap();
     let refused = call("");
-    assert_eq!(refused.code, Some(1));
-    assert!(
-        refused.stderr.contains("a_L2-ev.png: has") && refused.stderr.contains("--force"),
-        "{}",
-        refused.stderr
-    );
+    insta::assert_snapshot!(refused.messages(), @"
+    exit code: 1
+    ERROR out/a_L2-ev.png: has 730 bytes, was written with 2420, and its pixels differ; --force overwrites it,
+        another --out keeps both
+    ");
     assert_eq!(fs::read(&image).unwrap(), edited);
     assert_eq!(call("--force").stdout, "out: 1 made of 1 frame\n");
     assert_eq!(fs::read(&image).unwrap(), written);
@@ -209,40 +201,52 @@ fn a_json_file_vouches_for_the_bytes_of_its_image() {
     fs::remove_file(&json).unwrap();
     fs::write(&image, fs::read(bench.path("frames/a.png")).unwrap()).unwrap();
     let refused = call("");
-    assert!(
-        refused.stderr.contains("no JSON file describes it"),
-        "{}",
-        refused.stderr
-    );
+    insta::assert_snapshot!(refused.messages(), @"
+    exit code: 1
+    ERROR out/a_L2-ev.png: no JSON file describes it, and its pixels differ; --force overwrites it, another --out
+        keeps both
+    ");
     assert!(!json.exists());
 
     // A JSON file without its image, and one of the first schema, which had no digest.
     assert_eq!(call("--force").code, Some(0));
     fs::remove_file(&image).unwrap();
     let missing = bench.call(&words("synthesize --check out"));
-    assert_eq!(missing.code, Some(1));
-    assert!(missing.stderr.contains("a_L2-ev.png"), "{}", missing.stderr);
+    insta::assert_snapshot!(missing.messages(), @"
+    exit code: 1
+    ERROR out/a_L2-ev.png: cannot read: [OS ERROR]
+    ");
     assert_eq!(call("").stdout, "out: 1 made of 1 frame\n");
     let mut old = json_of(&json);
     old["schema"] = "darkqa.image/1".into();
     old.as_object_mut().unwrap().remove("output");
     fs::write(&json, old.to_string()).unwrap();
     let unvouched = bench.call(&words("synthesize --check out"));
-    assert!(
-        unvouched.stderr.contains("has no digest"),
-        "{}",
-        unvouched.stderr
-    );
+    insta::assert_snapshot!(unvouched.messages(), @"
+    exit code: 1
+    ERROR out/a_L2-ev.json: has no digest of its image: an older version wrote it; run `synthesize` again to add
+        it
+    ");
     // Its image has a JSON file, though one that cannot vouch for it.
-    let counted = "not as they were written: 1; without a JSON file: 0";
-    assert!(unvouched.stdout.contains(counted), "{unvouched:?}");
+    insta::assert_snapshot!(unvouched, @"
+    exit code: 1
+    stdout:
+    out: images as they were written: 0; not as they were written: 1; without a JSON file: 0
+    stderr:
+    ERROR out/a_L2-ev.json: has no digest of its image: an older version wrote it; run `synthesize` again to add
+        it
+    ");
     fs::copy(&image, bench.path("out/foreign.png")).unwrap();
     let foreign = bench.call(&words("synthesize --check out"));
-    assert!(
-        foreign.stdout.contains("without a JSON file: 1"),
-        "{foreign:?}"
-    );
-    assert!(foreign.stderr.contains("foreign.png"), "{foreign:?}");
+    insta::assert_snapshot!(foreign, @"
+    exit code: 1
+    stdout:
+    out: images as they were written: 0; not as they were written: 1; without a JSON file: 1
+    stderr:
+    ERROR out/a_L2-ev.json: has no digest of its image: an older version wrote it; run `synthesize` again to add
+        it
+    ERROR out: no JSON file says how they were made: foreign.png
+    ");
     fs::remove_file(bench.path("out/foreign.png")).unwrap();
     assert_eq!(call("").stdout, kept);
     assert_eq!(json_of(&json)["schema"], "darkqa.image/2");
@@ -283,12 +287,15 @@ fn a_file_makes_its_image_again() {
     let wrong = bench.call(&words(
         "synthesize b.png --out again --from out/a_L3-noise@custom.json",
     ));
-    assert_eq!(wrong.code, Some(2));
-    assert!(wrong.stderr.contains("another image"), "{}", wrong.stderr);
+    insta::assert_snapshot!(wrong.messages(), @"
+    exit code: 2
+    error: out/a_L3-noise@custom.json: made from another image than INPUT (their contents differ, or the flags by
+        which they are read)
+    ");
 }
 
 #[test]
-fn one_broken_frame_does_not_stop_the_others() {
+fn broken_frame_fails_alone() {
     let bench = Bench::new();
     frames(&bench);
     bench.file("frames/b.png", "no image");
@@ -303,43 +310,52 @@ fn one_broken_frame_does_not_stop_the_others() {
 }
 
 #[test]
-fn what_makes_no_sense_is_one_line() {
+fn senseless_calls_get_one_line() {
     let bench = Bench::new();
     frames(&bench);
     fs::copy(bench.path("frames/a.png"), bench.path("frames/a.PNG")).unwrap();
     bench.file("my.toml", "name = \"mine\"\nadu-range = nan\n");
-    let cases: [(&[&str], &str); 6] = [
-        (&["frames"], "would both be written as a;"),
-        (&["none"], "none"),
-        (&["frames/a.png", "--camera", "my.toml"], "my.toml"),
-        (
-            &["frames/a.png", "--sheet", "all"],
-            "'--sheet <SHEET>' [possible values: levels, noise]",
-        ),
-        (&["frames/a.png", "--from", "my.toml"], "my.toml"),
-        (
-            &["frames/a.png", "--coupling", "photon", "--ratio", "4"],
-            "--noise ratio",
-        ),
+    let calls = [
+        "frames",
+        "none",
+        "frames/a.png --camera my.toml",
+        "frames/a.png --sheet all",
+        "frames/a.png --from my.toml",
+        "frames/a.png --coupling photon --ratio 4",
     ];
-    check_rows(cases, |(args, message)| {
-        let refused = bench.call(&[&["synthesize", "--out", "out"], args].concat());
-        assert_eq!(refused.code, Some(2), "{refused:?}");
-        assert_eq!(
-            refused.stderr.trim_end().lines().count(),
-            1,
-            "{}",
-            refused.stderr
-        );
-        assert!(refused.stderr.contains(message), "{}", refused.stderr);
+    let errors = each(calls, |call| {
+        let refused = bench.call(&words(&format!("synthesize --out out {call}")));
+        assert_eq!(refused.stderr.trim_end().lines().count(), 1, "{refused:?}");
+        refused.messages()
     });
+    insta::assert_snapshot!(errors, @r#"
+    frames
+      exit code: 2
+      error: INPUT: "a.png" of frames and "a.PNG" of frames would both be written as a; rename one of them, or give
+          each folder its own --out
+    none
+      exit code: 2
+      error: none: cannot read: [OS ERROR]
+    frames/a.png --camera my.toml
+      exit code: 2
+      error: my.toml, line 1: not a calibration: missing field `gain`
+    frames/a.png --sheet all
+      exit code: 2
+      error: invalid value 'all' for '--sheet <SHEET>' [possible values: levels, noise]
+    frames/a.png --from my.toml
+      exit code: 2
+      error: my.toml: not a JSON file of an image: expected ident at line 1 column 2
+    frames/a.png --coupling photon --ratio 4
+      exit code: 2
+      error: --noise ratio: with --noise coupling=photon, or a profile that has it, the ratio is 2^EV; leave out
+          --noise ratio
+    "#);
     let small = bench.call(&words("synthesize frames/a.png --out out --max-pixels 100"));
-    assert_eq!(small.code, Some(1));
-    assert!(
-        small.stderr.contains("--decode max-pixels"),
-        "{}",
-        small.stderr
-    );
+    insta::assert_snapshot!(small.messages(), @"
+    exit code: 1
+    ERROR frames/a.png: 37 × 21 pixels are more than the 100 that are read; shrink it first, or raise --decode
+        max-pixels
+    ");
 }
 
 #[test]
@@ -364,19 +380,19 @@ fn sheets_are_drawn_for_each_frame() {
     let first = image::open(bench.path("out/a_levels.png")).unwrap();
     let other = call("--profile all");
     assert_eq!(other.stdout, "out: 1 made of 1 frame\n");
-    assert!(
-        other
-            .stderr
-            .contains("with other settings; it is made again"),
-        "{}",
-        other.stderr
-    );
+    insta::assert_snapshot!(other.messages(), @"
+    exit code: 0
+     WARN out/a_levels.png: made from another image or with other settings; it is made again
+    ");
     let second = image::open(bench.path("out/a_levels.png")).unwrap();
     assert!(second.height() > first.height(), "no row for each reading");
     first.save(bench.path("out/a_levels.png")).unwrap();
     let refused = call("");
-    assert_eq!(refused.code, Some(1));
-    assert!(refused.stderr.contains("--force"), "{}", refused.stderr);
+    insta::assert_snapshot!(refused.messages(), @"
+    exit code: 1
+    ERROR out/a_levels.png: made from another image or with other settings (images, light: sensor: readings: eld
+        and level and physical); --force overwrites it, another --out keeps both
+    ");
 }
 
 /// The numbers of an exposure in a file or a record.
@@ -396,7 +412,7 @@ fn exposure(of: &Value) -> [Option<f64>; 7] {
 /// Automatic exposure and motion blur: their files hold what the camera did, make the image again byte for byte, and are what an
 /// evaluation sends.
 #[test]
-fn a_camera_that_meets_the_dark_and_moves() {
+fn camera_that_meets_dark_and_moves() {
     let bench = Bench::new();
     frames(&bench);
     let light = words(
@@ -471,7 +487,7 @@ fn a_camera_that_meets_the_dark_and_moves() {
 
 /// A focal length that the data state counts, and the field of view of the flag does not.
 #[test]
-fn frames_with_a_known_camera_use_it() {
+fn frames_with_known_camera_use_it() {
     let bench = Bench::new();
     let rooms = bench.call(&words("rooms --out rooms --frames 1 --size 96x64"));
     assert_eq!(rooms.code, Some(0), "{rooms:?}");
@@ -510,43 +526,51 @@ fn walk(folder: &Path, end: &str) -> std::path::PathBuf {
 }
 
 #[test]
-fn what_the_camera_cannot_do_is_refused() {
+fn what_camera_cannot_do_is_refused() {
     let bench = Bench::new();
     frames(&bench);
-    check_rows(
-        [
-            (
-                "--variant auto --auto gain=5",
-                "--auto: at 5 stops of gain, K is 12, but sony-a7s2 has K from 0.1 to 6",
-            ),
-            ("--variant auto --auto gian=5", "did you mean gain?"),
-            (
-                "--variant motion --motion sped=5",
-                "there is no setting \"sped\"; the settings are speed, hfov, angle; did you mean speed?",
-            ),
-            (
-                "--variant motion --levels L3",
-                "--levels: L3 is a level of ev, noise, auto, but --variant motion selects none of them",
-            ),
-            (
-                "--variant blur",
-                "\"blur\" is not one of ev, noise, auto, motion, both, all",
-            ),
-        ],
-        |(flags, message)| {
-            let call = format!("synthesize frames --out out {flags}");
-            let refused = bench.call(&words(&call));
-            assert_eq!(refused.code, Some(2), "{refused:?}");
-            assert!(refused.stderr.contains(message), "{}", refused.stderr);
-        },
-    );
+    let flags = [
+        "--variant auto --auto gain=5",
+        "--variant auto --auto gian=5",
+        "--variant motion --motion sped=5",
+        "--variant motion --levels L3",
+        "--variant blur",
+    ];
+    let errors = each(flags, |flags| {
+        let call = format!("synthesize frames --out out {flags}");
+        bench.call(&words(&call)).messages()
+    });
+    insta::assert_snapshot!(errors, @r#"
+    --variant auto --auto gain=5
+      exit code: 2
+      error: --auto: at 5 stops of gain, K is 12, but sony-a7s2 has K from 0.1 to 6; set another base-gain or fewer
+          stops of gain
+    --variant auto --auto gian=5
+      exit code: 2
+      error: invalid value 'gian=5' for '--auto <KEY=VALUE,…>': there is no setting "gian"; the settings are
+          shutter, gain, base-gain, base-time; did you mean gain?
+    --variant motion --motion sped=5
+      exit code: 2
+      error: invalid value 'sped=5' for '--motion <KEY=VALUE,…>': there is no setting "sped"; the settings are
+          speed, hfov, angle; did you mean speed?
+    --variant motion --levels L3
+      exit code: 2
+      error: --levels: L3 is a level of ev, noise, auto, but --variant motion selects none of them
+    --variant blur
+      exit code: 2
+      error: invalid value 'blur' for '--variant <LIST>': "blur" is not one of ev, noise, auto, motion, both, all
+    "#);
     // How far a picture moves depends on its size: the image fails, with its name.
     let far = "--variant motion --levels T33.33,T500 --motion speed=2000";
     let far = bench.call(&words(&format!("synthesize frames --out out {far}")));
     assert_eq!(far.code, Some(1), "{far:?}");
     assert_eq!(far.stdout, "out: 1 made of 1 frame, 1 failed\n");
     let message = "a.png at T500-motion: --motion: the picture would move by 39";
-    assert!(far.stderr.contains(message), "{}", far.stderr);
+    insta::assert_snapshot!(far.messages(), @"
+    exit code: 1
+    ERROR a.png at T500-motion: --motion: the picture would move by 391.69 pixels during the exposure; at most 256
+        are possible: ask for a shorter exposure, or set a lower speed with --motion speed=…
+    ");
     // An evaluation is refused before anything is asked.
     let run =
         "--data frames --model random --out run --variant motion --levels T500 --motion speed=2000";
@@ -557,7 +581,7 @@ fn what_the_camera_cannot_do_is_refused() {
 
 /// A sheet has a row for each variant, and a block of its own for exposure times.
 #[test]
-fn sheets_show_the_variants_that_are_asked() {
+fn sheets_show_variants_that_are_asked() {
     let bench = Bench::new();
     frames(&bench);
     let height = |variant: &str, out: &str| {

@@ -8,6 +8,7 @@ use serde_json::Value;
 
 use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::run::{Bench, Called, records, words};
+use crate::support::snapshot::{lines_with, redacted};
 
 const RUN: &str = "--models models.toml --data set.jsonl --levels L0 --retries 0 --out run";
 
@@ -55,7 +56,7 @@ fn endpoint() -> MockEndpoint {
 }
 
 #[test]
-fn a_model_that_is_taken_out_is_left_out_and_kept() {
+fn removed_model_is_excluded_but_kept() {
     let mock = endpoint();
     let url = mock.base_url();
     let bench = Bench::with_questions(2);
@@ -73,8 +74,22 @@ fn a_model_that_is_taken_out_is_left_out_and_kept() {
     assert_eq!(names(&bench), all);
     let asked = mock.requests().len();
     let run = complete(&bench, std::slice::from_ref(&two), "");
-    let line = "! one and random are left out of run:";
-    assert!(run.stdout.contains(line), "{}", run.stdout);
+    insta::assert_snapshot!(run, @"
+    exit code: 0
+    stdout:
+    two · 2 questions · 1 frame · 2 replies, 0 failed · intervals by question
+    ! Only 2 questions (8 are needed): intervals and tests are rough.
+    ! one and random are left out of run: the file of models has no such model any
+      more, or has it with other settings; report --all shows all.
+
+     accuracy in %
+     two          L0   95 %
+     untouched   0.0   0.0 +65.8
+     95 %: how far the widest interval of the row reaches down and up
+     chance 33.3
+    run: run
+    report: run/report.html
+    ");
     assert_eq!(names(&bench), ["two"]);
     let kept = records(&bench.path("run"));
     assert!(kept.iter().any(|record| record["model"] == "one"));
@@ -91,7 +106,7 @@ fn a_model_that_is_taken_out_is_left_out_and_kept() {
 
 /// The control of the observer is asked with it, and no file names it.
 #[test]
-fn a_control_of_the_observer_goes_with_it() {
+fn control_of_observer_goes_with_it() {
     let bench = Bench::new();
     let [observer, random] = ["observer", "random"].map(|id| format!("[[model]]\nid = \"{id}\"\n"));
     let line = "--models models.toml --levels L0 --out run";
@@ -108,16 +123,26 @@ fn a_control_of_the_observer_goes_with_it() {
     let shown = complete(observer + &random, "--only random");
     assert!(has_control() && !shown.contains("left out"), "{shown}");
     let shown = complete(random, "");
-    assert!(
-        shown.contains("observer and observer:other-room are left out"),
-        "{shown}"
-    );
+    insta::assert_snapshot!(redacted(&shown), @"
+    random · 19 questions · 6 frames · 19 replies, 0 failed · intervals by frame
+    ! Only 6 frames (8 are needed): intervals and tests are rough.
+    ! observer and observer:other-room are left out of run: the file of models has
+      no such model any more, or has it with other settings; report --all shows all.
+
+     accuracy in %
+     random       L0   95 %
+     untouched  52.6   −30.5 +28.7
+     95 %: how far the widest interval of the row reaches down and up
+     chance 38.6
+    run: run
+    report: run/report.html
+    ");
     let shown = bench.complete(&words("report run --json"));
     assert!(!shown.contains("\"model\": \"observer\""), "{shown}");
 }
 
 #[test]
-fn a_model_with_other_settings_is_another_model() {
+fn changed_settings_make_another_model() {
     let mock = endpoint();
     let url = mock.base_url();
     let bench = Bench::with_questions(3);
@@ -125,11 +150,22 @@ fn a_model_with_other_settings_is_another_model() {
     complete(&bench, &[with(20)], "");
     assert_eq!(accuracies(&bench)["m"], "0.0");
     let run = complete(&bench, &[with(9)], "");
-    assert!(
-        run.stdout.contains("m (before) is left out of run"),
-        "{}",
-        run.stdout
-    );
+    insta::assert_snapshot!(run, @"
+    exit code: 0
+    stdout:
+    m · 3 questions · 1 frame · 3 replies, 0 failed · intervals by question
+    ! Only 3 questions (8 are needed): intervals and tests are rough.
+    ! m (before) is left out of run: the file of models has no such model any more,
+      or has it with other settings; report --all shows all.
+
+     accuracy in %
+     m            L0   95 %
+     untouched 100.0   −56.1 0.0
+     95 %: how far the widest interval of the row reaches down and up
+     chance 33.3
+    run: run
+    report: run/report.html
+    ");
     assert_eq!(mock.requests().len(), 6);
     assert_eq!(
         accuracies(&bench),
@@ -167,11 +203,11 @@ fn a_model_with_other_settings_is_another_model() {
     let flags =
         format!("--data set.jsonl --levels L0 --out run --model m --max-tokens 7 --base-url {url}");
     let refused = bench.call(&words(&flags));
-    assert_eq!(refused.code, Some(2), "{refused:?}");
-    assert!(
-        refused.stderr.contains("another --max-tokens"),
-        "{refused:?}"
-    );
+    insta::assert_snapshot!(refused.messages(), @"
+    exit code: 2
+    error: run: the model m has another --max-tokens in this run: it was 8, now it is 7; use another --out, or the
+        same --max-tokens
+    ");
 }
 
 #[test]
@@ -198,7 +234,7 @@ fn two_models_may_exchange_their_names() {
 
 /// A model is asked with and without images under two names; they differ in nothing else.
 #[test]
-fn replies_with_and_without_images_keep_apart_under_new_names() {
+fn renamed_models_separate_blind_replies() {
     const BLIND: &str = "view = \"blind\"";
     // Right (C) where there is an image.
     let mock = MockEndpoint::answering(|body| {
@@ -243,8 +279,19 @@ fn replies_with_and_without_images_keep_apart_under_new_names() {
     let bench = Bench::with_questions(2);
     complete(&bench, &tables("x", "y"), "");
     let run = complete(&bench, &[table("x", "m", &url, BLIND)], "");
-    let left = "x (before) is left out of run";
-    assert!(run.stdout.contains(left), "{}", run.stdout);
+    insta::assert_snapshot!(run, @"
+    exit code: 0
+    stdout:
+    x · 2 questions · 1 frame · 2 replies, 0 failed · intervals by question
+    ! Only 2 questions (8 are needed): intervals and tests are rough.
+    ! x (before) is left out of run: the file of models has no such model any more,
+      or has it with other settings; report --all shows all.
+
+     accuracy in %
+     without images: x 0.0 [0.0, 65.8] · chance 33.3
+    run: run
+    report: run/report.html
+    ");
     assert_eq!(
         accuracies(&bench),
         BTreeMap::from([("x".into(), "0.0".into())])
@@ -252,7 +299,7 @@ fn replies_with_and_without_images_keep_apart_under_new_names() {
 }
 
 #[test]
-fn models_whose_requests_were_changed_are_marked() {
+fn models_with_adapted_requests_are_marked() {
     let strict = MockEndpoint::answering(|body| match body.get("temperature") {
         Some(_) => Answer::error(
             400,
@@ -269,11 +316,19 @@ fn models_whose_requests_were_changed_are_marked() {
     ];
     let run = complete(&bench, &tables, "");
     let foot = "† requests were changed because the server refused what was set (thinker: no";
-    assert!(run.stdout.contains(" thinker †"), "{}", run.stdout);
+    insta::assert_snapshot!(run.lines_with("†"), @"
+    exit code: 0
+     thinker † 100.0   −65.8 0.0
+     † requests were changed because the server refused what was set (thinker: no
+    ");
     assert!(run.stdout.contains(foot), "{}", run.stdout);
     assert!(!run.stdout.contains("plain †"), "{}", run.stdout);
     let full = bench.complete(&["report", "run", "--full"]);
-    assert!(full.contains("thinker †") && full.contains(foot), "{full}");
+    insta::assert_snapshot!(lines_with(&full, "†"), @"
+     thinker †   untouched   100.0   2          0        0   −65.8 0.0
+    † requests were changed because the server refused what was set (thinker: no temperature is sent: the server's
+        own is used)
+    ");
     let page = fs::read_to_string(bench.path("run/report.html")).unwrap();
     assert!(
         page.contains("<p class=\"foot\">† requests were changed"),
@@ -291,14 +346,18 @@ fn models_whose_requests_were_changed_are_marked() {
         table("plain", "p", &mock.base_url(), "max-tokens = 9"),
     ];
     let run = complete(&bench, &tables, "");
-    assert!(run.stdout.contains(" renamed †"), "{}", run.stdout);
+    insta::assert_snapshot!(run.lines_with("†"), @"
+    exit code: 0
+     renamed † 100.0   −65.8 0.0
+     † requests were changed because the server refused what was set (renamed: no
+    ");
     // Without a change there is no mark.
     let run = complete(&bench, &tables[1..], "");
     assert!(!run.stdout.contains('†'), "{}", run.stdout);
 }
 
 #[test]
-fn columns_about_models_are_shown_on_demand() {
+fn model_columns_show_on_demand() {
     let mock = endpoint();
     let url = mock.base_url();
     let bench = Bench::with_questions(2);
@@ -310,18 +369,30 @@ fn columns_about_models_are_shown_on_demand() {
     assert!(!run.stdout.contains("org/first"), "{}", run.stdout);
     let line = "report run --columns id,deployment,served";
     let short = bench.complete(&words(line));
-    let about = " First: id org/first · deployment fp8 · served as mock-1";
-    assert!(short.contains(about), "{short}");
-    assert!(
-        short.contains(" Second: id org/second · deployment – · served as mock-1"),
-        "{short}"
-    );
+    insta::assert_snapshot!(redacted(&short), @"
+    2 models · 2 questions · 1 frame · 4 replies, 0 failed · intervals by question
+    ! Only 2 questions (8 are needed): intervals and tests are rough.
+
+     accuracy in %
+     untouched    L0   95 %
+     First       0.0   0.0 +65.8
+     Second      0.0   0.0 +65.8
+     95 %: how far the widest interval of the row reaches down and up
+     chance 33.3
+     First: id org/first · deployment fp8 · served as mock-1
+     Second: id org/second · deployment – · served as mock-1
+    run: run
+    report: run/report.html
+    ");
     let full = bench.complete(&words(&format!("{line} --full")));
     let row = full
         .lines()
         .find(|line| line.starts_with(" First "))
         .unwrap();
-    assert!(row.contains("org/first") && row.contains("fp8"), "{full}");
+    insta::assert_snapshot!(
+        redacted(row.trim_start()),
+        @"First    untouched   0.0   org/first    fp8          mock-1      2          0        0   0.0 +65.8"
+    );
     let page = fs::read_to_string(bench.path("run/report.html")).unwrap();
     assert!(
         page.contains("<th scope=\"col\">served as</th>"),

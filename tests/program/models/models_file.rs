@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 use crate::support::endpoint::{Answer, MockEndpoint, Request};
 use crate::support::house::House;
 use crate::support::run::{Bench, Called, called, files, model_args, records, words};
+use crate::support::snapshot::{each, redacted};
 
 /// A folder with questions and this file of models.
 fn bench(questions: usize, models: &str) -> Bench {
@@ -51,7 +52,7 @@ fn keys(bench: &Bench, run: &str) -> BTreeMap<(String, String), String> {
 }
 
 #[test]
-fn models_at_several_endpoints_are_asked_in_one_run() {
+fn one_run_asks_several_endpoints() {
     let (one, two) = (
         MockEndpoint::start([Answer::text("A")]),
         MockEndpoint::start([Answer::text("C")]),
@@ -139,7 +140,10 @@ id = "random"
     assert_eq!(models.len(), 4);
     assert_eq!(models[1]["key"], "the variable SECOND_KEY");
     assert_eq!(models[1]["headers"], json!(["X-Team", "X-Auth"]));
-    assert!(run.stdout.contains("First"), "{}", run.stdout);
+    insta::assert_snapshot!(run.lines_with("First"), @"
+    exit code: 0
+    First       0.0   0.0 +56.1
+    ");
     for file in files(&bench.path("run")) {
         let text = String::from_utf8_lossy(&fs::read(&file).unwrap()).into_owned();
         assert!(!text.contains("-0123456789"), "{}", file.display());
@@ -161,7 +165,7 @@ fn limit_sent(models: &str, line: &str, variable: Option<&str>) -> Value {
 }
 
 #[test]
-fn a_model_is_above_the_flags_and_the_flags_are_above_the_defaults() {
+fn model_overrides_flags_override_defaults() {
     const BARE: &str = "[[model]]\nid = \"m\"\nendpoints = [\"URL\"]\n";
     let defaults = format!("[defaults]\nmax-tokens = 12\n{BARE}");
     let own = format!("{defaults}max_tokens = 14\n");
@@ -177,7 +181,7 @@ fn a_model_is_above_the_flags_and_the_flags_are_above_the_defaults() {
 }
 
 #[test]
-fn a_flag_that_a_model_overrides_is_said_once() {
+fn overridden_flag_is_reported_once() {
     let mock = MockEndpoint::start([Answer::text("A")]);
     let url = mock.base_url();
     let table =
@@ -193,68 +197,108 @@ fn a_flag_that_a_model_overrides_is_said_once() {
 }
 
 #[test]
-fn what_is_wrong_in_a_file_is_named_by_line() {
+fn file_errors_name_their_line() {
     let table = |line: &str| {
         format!("[[model]]\nid = \"m\"\nendpoints = [\"http://127.0.0.1:9/v1\"]\n{line}\n")
     };
-    for (line, part) in [
-        (
-            "max-token = 3",
-            "line 4: there is no key max-token; did you mean max-tokens?",
-        ),
-        ("base-url = \"a\"", "did you mean endpoints?"),
-        ("api_key = \"a\"", "did you mean key-env?"),
-        ("model = \"a\"", "did you mean id?"),
-        ("qqqq = 3", "line 4: there is no key qqqq\n"),
-        ("rpm = \"many\"", "line 4: rpm: invalid value 'many'"),
-        ("temperature = \"hot\"", "line 4: temperature: "),
-        ("view = \"both eyes\"", "image, blind or both"),
-        ("price = { input = 1 }", "line 4: price: "),
-        ("limit = 0", "line 4: limit: "),
-        ("headers = { X-A = 3 }", "line 4: headers: "),
-        ("body = { temperature = 1 }", "use --temperature"),
-        ("max-side = 300", "set it in [defaults], or use --max-side"),
-        ("name = \"\"", "line 4: name: a text expected"),
-        ("key-env = \"NOWHERE_KEY\"", "NOWHERE_KEY is not set"),
-    ] {
-        let error = refusal(&table(line), "");
-        assert!(error.contains(part), "{line}: {error}");
-        assert!(error.contains("models.toml, line"), "{line}: {error}");
-    }
+    let lines = [
+        "max-token = 3",
+        "base-url = \"a\"",
+        "api_key = \"a\"",
+        "model = \"a\"",
+        "qqqq = 3",
+        "rpm = \"many\"",
+        "temperature = \"hot\"",
+        "view = \"both eyes\"",
+        "price = { input = 1 }",
+        "limit = 0",
+        "headers = { X-A = 3 }",
+        "body = { temperature = 1 }",
+        "max-side = 300",
+        "name = \"\"",
+        "key-env = \"NOWHERE_KEY\"",
+    ];
+    let errors = each(lines, |line| redacted(&refusal(&table(line), "")));
+    insta::assert_snapshot!(errors, @r#"
+    max-token = 3
+      error: models.toml, line 4: there is no key max-token; did you mean max-tokens?
+    base-url = "a"
+      error: models.toml, line 4: there is no key base-url; did you mean endpoints?
+    api_key = "a"
+      error: models.toml, line 4: there is no key api-key; did you mean key-env?
+    model = "a"
+      error: models.toml, line 4: there is no key model; did you mean id?
+    qqqq = 3
+      error: models.toml, line 4: there is no key qqqq
+    rpm = "many"
+      error: models.toml, line 4: rpm: invalid value 'many' for '--rpm <N>': invalid digit found in string
+    temperature = "hot"
+      error: models.toml, line 4: temperature: invalid value 'hot' for '--temperature <T|auto|default>': a number
+          from 0 on, auto or default expected
+    view = "both eyes"
+      error: models.toml, line 4: view: image, blind or both expected
+    price = { input = 1 }
+      error: models.toml, line 4: price: missing field `output`; { input = 2.5, output = 10 } expected, dollars per
+          million tokens
+    limit = 0
+      error: models.toml, line 4: limit: a whole number from 1 on expected
+    headers = { X-A = 3 }
+      error: models.toml, line 4: headers: { NAME = "value", NAME = { env = "VARIABLE" } } expected
+    body = { temperature = 1 }
+      error: models.toml, line 2: m: --extra-body: temperature is set by the program: use --temperature
+    max-side = 300
+      error: models.toml, line 4: max-side applies to all models, because each image is made once: set it in
+          [defaults], or use --max-side
+    name = ""
+      error: models.toml, line 4: name: a text expected
+    key-env = "NOWHERE_KEY"
+      error: models.toml, line 2: m: --api-key-env: the variable NOWHERE_KEY is not set
+    "#);
     let error = refusal("[defaults]\nid = \"m\"\n[[model]]\nid = \"random\"", "");
-    assert!(error.contains("line 2: id belongs to one model"), "{error}");
+    insta::assert_snapshot!(redacted(&error), @"error: models.toml, line 2: id belongs to one model: it cannot be in [defaults]");
     let error = refusal("[[model]]\nname = \"m\"", "");
-    assert!(error.contains("a model without id"), "{error}");
+    insta::assert_snapshot!(
+        redacted(&error),
+        @"error: models.toml, line 2: a model without id: what the endpoint calls it, or random, observer, script:FILE"
+    );
     let secret = refusal(&table("key-env = \"sk-0123456789\""), "");
     assert!(
         secret.contains("line 4") && !secret.contains("0123"),
         "{secret}"
     );
-    for (line, part) in [
-        ("--set n.rpm=3", "the models are m"),
-        ("--set m.rpms=3", "did you mean rpm?"),
-        ("--set m.id=n", "cannot be set"),
-        ("--only n", "the models are m"),
-    ] {
-        let error = refusal(&table(""), line);
-        assert!(error.contains(part), "{line}: {error}");
-    }
+    let flags = [
+        "--set n.rpm=3",
+        "--set m.rpms=3",
+        "--set m.id=n",
+        "--only n",
+    ];
+    let errors = each(flags, |flag| redacted(&refusal(&table(""), flag)));
+    insta::assert_snapshot!(errors, @"
+    --set n.rpm=3
+      error: --set: n.rpm: no model of this name; the models are m
+    --set m.rpms=3
+      error: --set: there is no key rpms; did you mean rpm?
+    --set m.id=n
+      error: --set: id identifies the model, and cannot be set
+    --only n
+      error: --only: n: no model of this name; the models are m
+    ");
 }
 
 #[test]
-fn two_models_with_the_same_trials_are_refused() {
+fn models_with_same_trials_are_refused() {
     let table = |name: &str, more: &str| {
         format!(
             "[[model]]\nname = \"{name}\"\nid = \"m\"\nendpoints = [\"http://127.0.0.1:9/v1\"]\n{more}\n"
         )
     };
     let error = refusal(&(table("a", "") + &table("b", "rpm = 3")), "");
-    assert!(
-        error.contains("a and b differ in nothing that decides the reply"),
-        "{error}"
-    );
+    insta::assert_snapshot!(redacted(&error), @"
+    error: --model: a and b differ in nothing that decides the reply: leave one of them out, with its flag or its
+        view in a file of models; if they are two deployments, set deployment there
+    ");
     let error = refusal(&(table("a", "") + &table("a", "temperature = 1")), "");
-    assert!(error.contains("a is named twice"), "{error}");
+    insta::assert_snapshot!(redacted(&error), @"error: --model: a is named twice; in a file of models, give each its own name");
     let bench = bench(1, &(table("a", "") + &table("b", "deployment = \"fp8\"")));
     let called = call(&bench, "--dry-run");
     assert_eq!(called.code, Some(0), "{called:?}");
@@ -271,7 +315,7 @@ fn two_models_with_the_same_trials_are_refused() {
 }
 
 #[test]
-fn flags_and_a_file_make_the_same_trials() {
+fn flags_and_file_make_same_trials() {
     let mock = MockEndpoint::start([Answer::text("A")]);
     let url = mock.base_url();
     let bench = bench(
@@ -317,7 +361,7 @@ fn flags_and_a_file_make_the_same_trials() {
 }
 
 #[test]
-fn a_fatal_answer_stops_one_model_alone() {
+fn fatal_answer_stops_one_model_alone() {
     let refused = MockEndpoint::start([Answer::error(401, "invalid_api_key", "no such key")]);
     let good = MockEndpoint::start([Answer::text("A")]);
     let table =
@@ -335,7 +379,11 @@ fn a_fatal_answer_stops_one_model_alone() {
         }),
         "{run:?}"
     );
-    assert!(run.stdout.contains("open"), "{}", run.stdout);
+    insta::assert_snapshot!(run.lines_with("open"), @"
+    exit code: 1
+    open · 8 questions · 1 frame · 8 replies, 0 failed · intervals by question
+     open         L0   95 %
+    ");
     let line = RUN.replace("--out run", "--out fast --fail-fast --concurrency 1");
     let fast = bench.call(&words(&line));
     assert_eq!(fast.code, Some(2), "{fast:?}");
@@ -351,7 +399,7 @@ fn a_fatal_answer_stops_one_model_alone() {
 }
 
 #[test]
-fn some_of_the_models_and_some_of_the_questions() {
+fn models_and_questions_can_be_selected() {
     let mock = MockEndpoint::start([Answer::text("A")]);
     let url = mock.base_url();
     let table = |id: &str, more: &str| {
@@ -378,7 +426,7 @@ fn some_of_the_models_and_some_of_the_questions() {
 }
 
 #[test]
-fn a_slow_model_does_not_hold_up_the_others() {
+fn slow_model_does_not_delay_others() {
     let slow = MockEndpoint::answering(|_| {
         std::thread::sleep(Duration::from_millis(120));
         Answer::text("A")
@@ -416,13 +464,13 @@ fn a_slow_model_does_not_hold_up_the_others() {
 }
 
 #[test]
-fn prices_of_a_model_hold_for_its_cost() {
+fn model_price_decides_its_cost() {
     let table = "[[model]]\nid = \"unpriced\"\nendpoints = [\"http://127.0.0.1:9/v1\"]\n";
     let error = call(&bench(1, table), "--max-cost 5").stderr;
-    assert!(
-        error.contains("price of unpriced") && error.contains("set price"),
-        "{error}"
-    );
+    insta::assert_snapshot!(redacted(&error), @"
+    error: --max-cost: the price of unpriced is not in the table of [DATE]; add it to your own table and name that
+        with --prices FILE, or set price in a file of models
+    ");
     let bench = bench(
         1,
         &format!("{table}price = {{ input = 1000000, output = 0, image-tokens = 100 }}\n"),
@@ -431,6 +479,7 @@ fn prices_of_a_model_hold_for_its_cost() {
     let forecast: Value = serde_json::from_str(&called.stdout).unwrap();
     let dollars = forecast.to_string();
     assert!(dollars.contains("unpriced"), "{dollars}");
+
     let called = call(&bench, "--max-cost 5 --concurrency 1");
     assert_eq!(called.code, Some(3), "{called:?}");
     // The report knows the price, too: 90 tokens of a prompt at a dollar each.
@@ -446,7 +495,7 @@ fn prices_of_a_model_hold_for_its_cost() {
 }
 
 #[test]
-fn the_command_models_shows_what_each_comes_to() {
+fn models_command_shows_resolved_settings() {
     let mock = MockEndpoint::start([
         Answer::text("B"),
         Answer::text("A"),
@@ -474,7 +523,6 @@ fn the_command_models_shows_what_each_comes_to() {
     assert!(mock.requests().is_empty());
     let mut command = bench.command(&["models", "models.toml", "--check", "--quiet"]);
     let checked = called(command.env("A_KEY", "secret-0123456789"));
-    assert_eq!(checked.code, Some(1), "{checked:?}");
     for part in [
         "A: \"B\" about a red image, of which B is true, in ",
         "A: \"A\" without an image",
@@ -492,7 +540,7 @@ fn the_command_models_shows_what_each_comes_to() {
 }
 
 #[test]
-fn open_questions_take_a_file_of_models() {
+fn open_questions_take_file_of_models() {
     let house = House::new();
     let mock = MockEndpoint::start([Answer::text("A table.")]);
     let url = mock.base_url();
@@ -518,12 +566,14 @@ fn open_questions_take_a_file_of_models() {
     let house_models = "[[model]]\nid = \"random\"\n";
     house.0.file("models.toml", house_models);
     let called = house.0.call(&words(line));
-    assert_eq!(called.code, Some(2), "{called:?}");
-    assert!(called.stderr.contains("open questions"), "{called:?}");
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 2
+    error: --model: a model that can answer open questions expected
+    ");
 }
 
 #[test]
-fn headers_that_decide_replies_are_part_of_a_trial() {
+fn headers_enter_the_trial_key() {
     let mock = MockEndpoint::start([Answer::text("A")]);
     let url = mock.base_url();
     let table = |name: &str, header: &str, more: &str| {
@@ -540,13 +590,19 @@ fn headers_that_decide_replies_are_part_of_a_trial() {
     let keys: std::collections::BTreeSet<String> = keys(&bench, "run").into_values().collect();
     assert_eq!((keys.len(), mock.requests().len()), (3, 3));
     let error = refusal(&(table("one", "1", "") + &table("two", "2", "")), "");
-    assert!(error.contains("differ in nothing"), "{error}");
+    insta::assert_snapshot!(redacted(&error), @"
+    error: --model: one and two differ in nothing that decides the reply: leave one of them out, with its flag or
+        its view in a file of models; if they are two deployments, set deployment there
+    ");
     let error = refusal(&table("one", "1", "reply-headers = [\"x-other\"]"), "");
-    assert!(error.contains("x-other: no header of this name"), "{error}");
+    insta::assert_snapshot!(redacted(&error), @"
+    error: models.toml, line 3: one: reply-headers: x-other: no header of this name with a value in headers: only
+        such a one can decide replies
+    ");
 }
 
 #[test]
-fn what_is_known_of_a_vendor_is_said_before_anything_is_sent() {
+fn vendor_notes_come_before_requests() {
     let table = |id: &str, url: &str, more: &str| {
         format!("[[model]]\nid = \"{id}\"\nendpoints = [\"{url}\"]\n{more}\n")
     };
@@ -556,9 +612,9 @@ fn what_is_known_of_a_vendor_is_said_before_anything_is_sent() {
         "constrain = \"json\"",
     );
     let error = refusal(&anthropic, "--dry-run");
-    assert!(
-        error.contains("--request constrain: Anthropic takes a constraint and ignores it"),
-        "{error}"
+    insta::assert_snapshot!(
+        redacted(&error),
+        @"error: --request constrain: Anthropic takes a constraint and ignores it, so it would be none; leave it out"
     );
     for (base, name) in [
         (
@@ -596,12 +652,15 @@ fn what_is_known_of_a_vendor_is_said_before_anything_is_sent() {
 }
 
 #[test]
-fn a_near_miss_of_a_built_in_model_is_refused() {
+fn misspelled_built_in_model_is_refused() {
     let bench = Bench::with_questions(1);
     let called = bench.call(&words("--model rndom --data set.jsonl --out run"));
     assert_eq!(called.code, Some(2));
-    let expected = "rndom: did you mean random? To ask an endpoint for a model of this name: --models FILE, or --base-url";
-    assert!(called.stderr.contains(expected), "{called:?}");
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 2
+    error: --model: rndom: did you mean random? To ask an endpoint for a model of this name: --models FILE, or
+        --base-url
+    ");
     let mock = MockEndpoint::start([Answer::text("A")]);
     let url = mock.base_url();
     bench.complete(&[

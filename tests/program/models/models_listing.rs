@@ -48,7 +48,7 @@ fn between<'a>(text: &'a str, start: &str, end: &str) -> &'a str {
 }
 
 #[test]
-fn rows_stand_in_the_order_of_the_file() {
+fn rows_stand_in_order_of_file() {
     let mock = MockEndpoint::start([Answer::text("C")]);
     let url = mock.base_url();
     let tables = NAMES.map(|name| table(name, &url, ""));
@@ -158,16 +158,15 @@ fn tables_are_divided_by_groups() {
     assert_eq!(mock.requests().len(), asked);
     bench.file("models.toml", table("big", &url, "group = \" \""));
     let called = bench.call(&words(RUN));
-    assert_eq!(called.code, Some(2), "{called:?}");
-    assert!(
-        called.stderr.contains("line 5: group: a text expected"),
-        "{called:?}"
-    );
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 2
+    error: models.toml, line 5: group: a text expected
+    ");
     assert_eq!(records(&bench.path("run")).len(), asked);
 }
 
 #[test]
-fn open_questions_are_shown_in_the_same_order() {
+fn open_report_keeps_file_order() {
     let house = House::new();
     let mock = MockEndpoint::start([Answer::text("4")]);
     let url = mock.base_url();

@@ -7,6 +7,7 @@ use serde_json::Value;
 use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::house::House;
 use crate::support::run::{Bench, Called, called, records, words};
+use crate::support::snapshot::each;
 
 fn table(id: &str, url: &str, more: &str) -> String {
     format!("[[model]]\nid = \"{id}\"\nendpoints = [\"{url}\"]\n{more}\n")
@@ -35,7 +36,7 @@ fn strange(models: &str, line: &str, variables: &[(&str, &str)]) -> Called {
 }
 
 #[test]
-fn a_file_that_came_with_the_data_takes_nothing_that_is_not_its_own() {
+fn supplied_file_gets_no_foreign_key() {
     const ELSEWHERE: &str = "https://evil.example/v1";
     const OPENAI: &str = "https://api.openai.com/v1";
     let key = [("OPENAI_API_KEY", "sk-0123456789")];
@@ -122,15 +123,16 @@ fn a_file_that_came_with_the_data_takes_nothing_that_is_not_its_own() {
         table("m", OPENAI, "")
     );
     let refused = strange(&defaults, "", &key);
-    assert!(
-        refused.stderr.contains("line 2: key-env: AWS_SECRET"),
-        "{refused:?}"
-    );
+    insta::assert_snapshot!(refused.messages(), @"
+    exit code: 2
+    error: ../data/models.toml, line 2: key-env: AWS_SECRET is not a variable of api.openai.com's own tools, and
+        the file may have come with the data from someone else; --allow models-file states that you trust it
+    ");
     assert_eq!(strange(&table("m", ELSEWHERE, ""), "", &[]).code, Some(0));
 }
 
 #[test]
-fn what_a_table_leaves_of_the_defaults_is_held_against_its_own_address() {
+fn inherited_defaults_check_model_address() {
     let evil = "https://evil.example/v1";
     let variables = [
         ("OPENAI_API_KEY", "sk-0123456789"),
@@ -196,7 +198,7 @@ fn what_a_table_leaves_of_the_defaults_is_held_against_its_own_address() {
     }
 }
 
-/// What is sent with `defaults` and the keys `more` of one table, whose address is a mock's.
+/// The request sent with `defaults` and the keys `more` of one table for a mock server.
 fn sent(defaults: &str, more: &str, line: &str) -> crate::support::endpoint::Request {
     let mock = MockEndpoint::start([Answer::text("C")]);
     let bench = Bench::with_questions(1);
@@ -215,7 +217,7 @@ fn sent(defaults: &str, more: &str, line: &str) -> crate::support::endpoint::Req
 }
 
 #[test]
-fn the_key_and_headers_of_the_defaults_go_to_each_address() {
+fn default_key_goes_everywhere() {
     let gateway = "key-env = \"GATEWAY_KEY\"";
     let secret = "headers = { X-A = { env = \"AWS_SECRET_ACCESS_KEY\" } }";
     let bearer = |key: &str| Some(format!("Bearer {key}"));
@@ -256,7 +258,7 @@ fn the_key_and_headers_of_the_defaults_go_to_each_address() {
 }
 
 #[test]
-fn a_file_of_another_folder_is_not_checked_with_any_key() {
+fn foreign_file_is_checked_without_key() {
     let mock = MockEndpoint::start([Answer::text("OK")]);
     let bench = Bench::new();
     let key = "key-env = \"AWS_SECRET_ACCESS_KEY\"";
@@ -290,7 +292,7 @@ fn a_file_of_another_folder_is_not_checked_with_any_key() {
 }
 
 #[test]
-fn a_table_of_vendors_says_how_a_host_is_asked() {
+fn vendor_table_defines_host_requests() {
     let mock = MockEndpoint::start([Answer::text("C")]);
     let bench = Bench::with_questions(1);
     let row = "[[vendor]]\nname = \"Mine\"\nhosts = [\"127.0.0.1\"]\nkey = [\"MY_KEY\"]\nheader = \"api-key\"\ntoken-field = \"max_completion_tokens\"\n";
@@ -338,17 +340,17 @@ fn a_table_of_vendors_says_how_a_host_is_asked() {
     bench.file("vendors.toml", row.replace("header", "headr"));
     let line = format!("{line} --vendor vendors.toml");
     let refused = bench.call(&words(&line));
-    assert_eq!(refused.code, Some(2), "{refused:?}");
-    assert!(
-        refused
-            .stderr
-            .contains("--vendor: vendors.toml: line 5: unknown field `headr`"),
-        "{refused:?}"
-    );
+    insta::assert_snapshot!(refused.messages(), @"
+    exit code: 2
+    error: --vendor: vendors.toml: line 5: unknown field `headr`, expected one of `name`, `hosts`, `key`,
+        `key-form`, `header`, `token-field`, `thinks-beyond-limit`, `image-bytes`, `image-side`, `images`,
+        `image-side-many`, `request-bytes`, `logprobs`, `batch`, `constrain`, `pin`, `account`, `addresses`; did
+        you mean header?; expected tables [[vendor]] with name, hosts and key, as in src/ask/vendors.toml
+    ");
 }
 
 #[test]
-fn settings_of_the_run_may_stand_in_the_defaults() {
+fn defaults_may_hold_run_settings() {
     let mock = MockEndpoint::start([Answer::text("C")]);
     let url = mock.base_url();
     let bench = Bench::with_questions(1);
@@ -398,45 +400,43 @@ fn settings_of_the_run_may_stand_in_the_defaults() {
     bench.file("models.toml", models("max-tokens = 9"));
     run("variable", "", &[("DARKQA_MAX_SIDE", "16")]);
     assert_eq!(image("variable")["width"], 16);
-    for (defaults, more, part) in [
-        (
-            "max-side = \"wide\"",
-            "",
-            "models.toml, line 2: invalid value 'wide'",
-        ),
-        (
-            "max-side = [3]",
-            "",
-            "models.toml, line 2: max-side: a text, a number or a switch expected",
-        ),
-        (
-            "",
-            "max-side = 3",
-            "max-side applies to all models, because each image is made once: set it in [defaults], or use --max-side",
-        ),
-        ("", "image = \"png\"", "image applies to all models"),
-    ] {
+    let lines = [
+        ("max-side = \"wide\"", ""),
+        ("max-side = [3]", ""),
+        ("", "max-side = 3"),
+        ("", "image = \"png\""),
+    ];
+    let errors = lines.map(|(defaults, more)| {
         bench.file("models.toml", models(defaults) + more);
-        let refused = bench.call(&words(&format!("{line} wrong")));
-        assert_eq!(refused.code, Some(2), "{refused:?}");
-        assert!(refused.stderr.contains(part), "{}", refused.stderr);
-    }
+        bench.call(&words(&format!("{line} wrong"))).messages()
+    });
+    insta::assert_snapshot!(errors.join("\n"), @"
+    exit code: 2
+    error: models.toml, line 2: invalid value 'wide' for '--image max-side=<PIXELS>': invalid digit found in
+        string
+    exit code: 2
+    error: models.toml, line 2: max-side: a text, a number or a switch expected
+    exit code: 2
+    error: models.toml, line 7: max-side applies to all models, because each image is made once: set it in
+        [defaults], or use --max-side
+    exit code: 2
+    error: models.toml, line 7: image applies to all models, because each image is made once: set it in
+        [defaults], or use --image
+    ");
     // Where the command has no such flag, the line says so; and open questions have no choices.
     let house = House::new();
     let line = "openeqa --questions questions.json --frames walks --num-frames 2 --levels L0 --models models.toml --out run";
-    for (defaults, part) in [
-        (
-            "max-side = 32",
-            "models.toml, line 2: max-side: this command has no --max-side",
-        ),
-        (
-            "temperature = 0\nprobabilities = true",
-            "open questions have no choices",
-        ),
-    ] {
+    let defaults = ["max-side = 32", "temperature = 0\nprobabilities = true"];
+    let errors = each(defaults, |defaults| {
         house.0.file("models.toml", models(defaults));
-        let refused = house.0.call(&words(line));
-        assert_eq!(refused.code, Some(2), "{refused:?}");
-        assert!(refused.stderr.contains(part), "{}", refused.stderr);
-    }
+        house.0.call(&words(line)).messages()
+    });
+    insta::assert_snapshot!(errors, @r"
+    max-side = 32
+      exit code: 2
+      error: models.toml, line 2: max-side: this command has no --max-side
+    temperature = 0 \n probabilities = true
+      exit code: 2
+      error: probabilities: m: open questions have no choices
+    ");
 }

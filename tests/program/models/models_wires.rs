@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 
 use crate::support::endpoint::{Answer, MockEndpoint, Request};
 use crate::support::run::{Bench, Called, model_args, records, words};
+use crate::support::snapshot::redacted;
 
 const RUN: &str = "--models models.toml --data set.jsonl --levels L0 --retries 0 --out run";
 
@@ -63,7 +64,7 @@ fn by_model(requests: &[Request]) -> BTreeMap<String, &Request> {
 }
 
 #[test]
-fn each_model_has_its_own_wire_and_its_own_words() {
+fn each_model_has_own_wire() {
     let mock = endpoint();
     let url = mock.base_url();
     let bench = bench(&format!(
@@ -84,7 +85,7 @@ fn each_model_has_its_own_wire_and_its_own_words() {
     assert_eq!(run.code, Some(0), "{run:?}");
     let requests = mock.requests();
     let sent = by_model(&requests);
-    assert!(sent["response"].line.contains("/v1/responses "));
+    insta::assert_snapshot!(redacted(&sent["response"].line), @"POST /v1/responses HTTP/1.1");
     let response = sent["response"].json();
     assert_eq!(response["instructions"], "Be brief.");
     assert_eq!(response["input"].as_array().unwrap().len(), 1);
@@ -120,7 +121,7 @@ fn each_model_has_its_own_wire_and_its_own_words() {
 }
 
 #[test]
-fn the_key_of_a_trial_differs_where_the_reply_may() {
+fn trial_key_follows_reply_settings() {
     let mock = endpoint();
     let url = mock.base_url();
     let key = |more: &str| -> String {
@@ -161,18 +162,17 @@ fn the_key_of_a_trial_differs_where_the_reply_may() {
 }
 
 #[test]
-fn a_model_is_above_the_flag_for_probabilities() {
+fn model_is_above_flag_for_probabilities() {
     let mock = endpoint();
     let url = mock.base_url();
     let models = table("with", &url, "") + &table("without", &url, "probabilities = false");
     let bench = bench(&models);
     let run = call(&bench, "--probabilities");
-    assert_eq!(run.code, Some(0), "{run:?}");
-    assert!(
-        run.stderr.contains("models with their own probabilities"),
-        "{}",
-        run.stderr
-    );
+    insta::assert_snapshot!(run.messages(), @"
+    exit code: 0
+     WARN models.toml: models with their own probabilities are not changed; the flag applies to the others (--set
+        NAME.KEY=VALUE overrides both)
+    ");
     let requests = mock.requests();
     let sent = by_model(&requests);
     assert_eq!(sent["with"].json()["top_logprobs"], 20);
@@ -183,18 +183,15 @@ fn a_model_is_above_the_flag_for_probabilities() {
         table("hot", &url, "temperature = 1\nprobabilities = true"),
     );
     let refused = call(&bench, "--dry-run");
-    assert_eq!(refused.code, Some(2), "{refused:?}");
-    assert!(
-        refused
-            .stderr
-            .contains("models.toml, line 2: hot: --request probabilities"),
-        "{}",
-        refused.stderr
-    );
+    insta::assert_snapshot!(refused.messages(), @"
+    exit code: 2
+    error: models.toml, line 2: hot: --request probabilities: the probabilities of tokens depend on the
+        temperature: --temperature 0, auto or default expected
+    ");
 }
 
 #[test]
-fn fields_that_say_a_flag_again_are_refused() {
+fn fields_repeating_flags_are_refused() {
     let mock = endpoint();
     let url = mock.base_url();
     let switch = "body = { chat_template_kwargs = { enable_thinking = false } }";
@@ -244,7 +241,7 @@ fn fields_that_say_a_flag_again_are_refused() {
 }
 
 #[test]
-fn the_table_of_a_file_says_how_each_model_is_asked() {
+fn listing_shows_wire_of_models() {
     let mock = endpoint();
     let bench = bench(&table("m", &mock.base_url(), "wire = \"responses\""));
     assert_eq!(call(&bench, "").code, Some(0));

@@ -166,7 +166,7 @@ fn every_setting_that_decides_is_named() {
 }
 
 #[test]
-fn other_light_stands_apart_and_shared_light_is_shared() {
+fn shared_light_is_compared() {
     let scene = Scene::new();
     scene.run("", "a");
     scene.run("--seed 1", "b");
@@ -249,7 +249,7 @@ fn other_light_stands_apart_and_shared_light_is_shared() {
 }
 
 #[test]
-fn models_of_one_name_are_named_by_what_differs() {
+fn equal_names_show_their_difference() {
     let scene = Scene::new();
     scene.run("", "a");
     scene.run("--detail low", "b");
@@ -268,7 +268,7 @@ fn models_of_one_name_are_named_by_what_differs() {
 }
 
 #[test]
-fn models_that_were_asked_other_questions_are_compared_by_the_shared_ones() {
+fn other_questions_compare_shared_ones() {
     let scene = Scene::new();
     scene.run("", "a");
     scene.run("--model n --limit 20", "b");
@@ -299,7 +299,7 @@ fn models_that_were_asked_other_questions_are_compared_by_the_shared_ones() {
 }
 
 #[test]
-fn each_side_of_a_baseline_costs_what_its_run_paid() {
+fn baseline_sides_keep_their_cost() {
     let scene = Scene::new();
     for (run, levels, dollars) in [
         ("old", "L1,L3", 10),
@@ -336,7 +336,7 @@ fn each_side_of_a_baseline_costs_what_its_run_paid() {
 }
 
 #[test]
-fn a_new_run_is_held_against_a_baseline() {
+fn new_run_is_held_against_baseline() {
     let scene = Scene::new();
     let run = |answers: &str, more: &str, out: &str| {
         scene.bench.file("m.jsonl", answers);
@@ -372,7 +372,11 @@ fn a_new_run_is_held_against_a_baseline() {
         "script:m.jsonl is worse than in old at L0, L3-ev, L3-noise, by up to 50.0 points."
     );
     assert_eq!(finding["verdict"], "worse");
-    assert!(worse.stdout.contains("is worse than in old"), "{worse:?}");
+    insta::assert_snapshot!(worse.lines_with("worse"), @"
+    exit code: 0
+     Baseline       −  script:m.jsonl is worse than in old at L0, L3-ev, L3-noise,
+    run: worse
+    ");
     let tex = fs::read_to_string(scene.bench.path("out/tables.tex")).unwrap();
     assert!(tex.contains("New less old"), "{tex}");
     let failing = scene
@@ -402,16 +406,23 @@ fn a_new_run_is_held_against_a_baseline() {
         .call(&words("report old --baseline light --fail-if-worse"));
     assert_eq!(passed_over.code, Some(2), "{passed_over:?}");
     let gap = "script:m.jsonl L3-noise of light is not compared: the new run has no reply about the same images";
-    assert!(passed_over.stderr.contains(gap), "{passed_over:?}");
+    insta::assert_snapshot!(passed_over.messages(), @"
+    exit code: 2
+    error: --fail-if-worse: script:m.jsonl L3-noise of light is not compared: the new run has no reply about the
+        same images; leave the flag out to see the report
+    ");
     let shown = scene.bench.call(&words("report old --baseline light"));
     let printed: Vec<&str> = shown.stdout.split_whitespace().collect();
     assert!(printed.join(" ").contains(gap), "{shown:?}");
     let alone = scene.bench.call(&words("report old --fail-if-worse"));
-    assert!(alone.stderr.contains("--baseline"), "{alone:?}");
+    insta::assert_snapshot!(alone.messages(), @"
+    exit code: 2
+    error: --fail-if-worse: compares with an old run: name it with --baseline OLD
+    ");
 }
 
 #[test]
-fn marks_of_two_judges_are_not_compared() {
+fn marks_of_different_judges_stay_apart() {
     let house = House::new();
     house.0.file("a.jsonl", "{\"default\": \"an answer\"}");
     for (judge, mark) in [("one", "2"), ("two", "4")] {
@@ -426,13 +437,16 @@ fn marks_of_two_judges_are_not_compared() {
     }
     let refused = house.0.call(&words("report one two"));
     assert_eq!(refused.code, Some(2));
-    let said = "two: its answers were marked by script:two.jsonl (upstream) and those of one by script:one.jsonl (upstream)";
-    assert!(refused.stderr.contains(said), "{refused:?}");
+    insta::assert_snapshot!(refused.messages(), @"
+    exit code: 2
+    error: two: its answers were marked by script:two.jsonl (upstream) and those of one by script:one.jsonl
+        (upstream): marks of two judges or protocols cannot be compared; report each run alone, or run openeqa on
+        its folder again with the other's --judge and --protocol: only marks are asked
+    ");
     let baseline = house.0.call(&words("report one --baseline two"));
-    assert!(
-        baseline
-            .stderr
-            .contains("--baseline: compares runs of questions with choices"),
-        "{baseline:?}"
-    );
+    insta::assert_snapshot!(baseline.messages(), @"
+    exit code: 2
+    error: --baseline: compares runs of questions with choices; marks of open questions have no such test: leave
+        it out
+    ");
 }

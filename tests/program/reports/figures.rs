@@ -9,6 +9,7 @@ use crate::reports::compared::Scene;
 use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::house::House;
 use crate::support::run::{files, model_args, words};
+use crate::support::snapshot::{lines_with, redacted};
 use crate::support::tools::{skip, succeeds};
 
 const LONG: &str = "a-model-with-a-name-of-30-characters";
@@ -72,7 +73,7 @@ fn data(scene: &Scene, name: &str) -> (BTreeMap<String, String>, Vec<BTreeMap<St
 }
 
 #[test]
-fn every_number_is_that_of_the_tables_and_the_bytes_are_the_same_twice() {
+fn figures_match_tables_reproducibly() {
     let scene = runs();
     for out in ["first", "second"] {
         let line = format!("figures run --out {out} --format pdf,svg,tex --columns 2");
@@ -164,7 +165,7 @@ fn names_and_widths_are_the_readers() {
 }
 
 #[test]
-fn what_is_not_known_is_refused_with_what_is() {
+fn unknown_names_list_the_known() {
     let scene = runs();
     let wrong = [
         ("--label nobody=A", "script:m.jsonl"),
@@ -193,29 +194,44 @@ fn what_is_not_known_is_refused_with_what_is() {
 }
 
 #[test]
-fn one_model_in_the_light_has_the_figures_there_are() {
+fn single_bright_model_has_figures() {
     let scene = Scene::new();
     scene.bench.file("m.jsonl", "{\"default\": \"red\"}");
     let line = "--model script:m.jsonl --data frames --levels L0 --out run";
     scene.bench.complete(&words(line));
     let said = scene.bench.complete(&words("figures run --out out"));
-    for left_out in [
-        "paper: left out, it has no panel",
-        "paper, the panel samples: left out, no dark image was asked",
-        "enhancers: left out",
-    ] {
-        assert!(said.contains(left_out), "{said}");
-    }
+    insta::assert_snapshot!(lines_with(&said, "left out"), @"
+    paper, the panel models: left out, no dark image was asked
+    paper, the panel variants: left out, only one variant of the light was asked
+    paper, the panel enhancers: left out, no enhancer was asked
+    paper, the panel samples: left out, no dark image was asked
+    paper: left out, it has no panel
+    accuracy: left out, the runs have no records for it
+    variants: left out, the runs have no records for it
+    enhancers: left out, the runs have no records for it
+    families: left out, the runs have no records for it
+    hallucination: left out, the runs have no records for it
+    collapse: left out, the runs have no records for it
+    confidence: left out, the runs have no records for it
+    photographed: left out, the runs have no records for it
+    thresholds: left out, the runs have no records for it
+    blur_thresholds: left out, the runs have no records for it
+    ");
     let captions = fs::read_to_string(scene.bench.path("out/captions.txt")).unwrap();
     assert!(captions.contains("enhancers: left out"), "{captions}");
     // With a dark level there are records, and too few of them.
     let line = "--model script:m.jsonl --data frames --levels L0,L3 --limit 2 --out few";
     scene.bench.complete(&words(line));
     let said = scene.bench.complete(&words("figures few --out out2"));
-    assert!(
-        said.contains("thresholds: left out, no curve has a threshold: "),
-        "{said}"
-    );
+    insta::assert_snapshot!(lines_with(&said, "left out"), @"
+    paper, the panel enhancers: left out, no enhancer was asked
+    enhancers: left out, the runs have no records for it
+    hallucination: left out, the runs have no records for it
+    confidence: left out, the runs have no records for it
+    photographed: left out, the runs have no records for it
+    thresholds: left out, no curve has a threshold: L0 has 2 replies in 2 clusters
+    blur_thresholds: left out, the runs have no records for it
+    ");
     assert!(
         said.contains("blur_thresholds: left out, the runs have no records"),
         "{said}"
@@ -223,7 +239,7 @@ fn one_model_in_the_light_has_the_figures_there_are() {
 }
 
 #[test]
-fn models_that_were_not_asked_in_the_light_of_the_sheet_are_named() {
+fn sheet_names_models_not_asked() {
     let scene = Scene::new();
     for (name, more) in [("a", "--seed 0"), ("b", "--seed 1")] {
         scene
@@ -237,10 +253,20 @@ fn models_that_were_not_asked_in_the_light_of_the_sheet_are_named() {
     let said = scene
         .bench
         .complete(&words("figures a-run b-run --only paper --out out"));
-    assert!(
-        said.contains("variants: left out, the same models were not asked in two variants"),
-        "{said}"
-    );
+    insta::assert_snapshot!(redacted(&said), @"
+    note: script:a.jsonl answers A whatever the image and the question: 20 of 20 replies to untouched images with
+        another true answer. Its accuracy measures no sight.
+    note: script:b.jsonl answers A whatever the image and the question: 20 of 20 replies to untouched images with
+        another true answer. Its accuracy measures no sight.
+    note: The light differs: --seed is 0 in a-run and 1 in b-run. noise stands apart as @a-run and @b-run: 10 of
+        10 shared images differ.
+    note: Short names: a is script:a.jsonl, b is script:b.jsonl.
+    out/paper.pdf
+    out/paper.svg
+    out/captions.txt
+    paper, the panel variants: left out, the same models were not asked in two variants
+    paper, the panel enhancers: left out, no enhancer was asked
+    ");
     let captions = fs::read_to_string(scene.bench.path("out/captions.txt")).unwrap();
     assert!(
         captions.contains("with noise @a-run") && captions.contains(" Not asked in this light: b."),
@@ -249,7 +275,7 @@ fn models_that_were_not_asked_in_the_light_of_the_sheet_are_named() {
 }
 
 #[test]
-fn a_run_of_open_questions_is_refused_with_what_to_do() {
+fn open_run_figures_name_remedy() {
     let house = House::new();
     let model = MockEndpoint::start([Answer::text("one")]);
     let base = model.base_url();
@@ -258,10 +284,10 @@ fn a_run_of_open_questions_is_refused_with_what_to_do() {
     let called = house.0.call(&words("figures run --out out"));
     assert_eq!(called.code, Some(2), "{called:?}");
     let said = &called.stderr;
-    assert!(
-        said.contains("open questions") && said.contains("`report`"),
-        "{said}"
-    );
+    insta::assert_snapshot!(redacted(said), @"
+    error: run: the run asked open questions: figures draws runs of questions with choices; `report` draws the
+        figures of these
+    ");
 }
 
 /// A document of the width of a column with all sources of a folder.
@@ -276,7 +302,7 @@ fn document(width: f64) -> String {
 }
 
 #[test]
-fn tex_sets_figures_and_tables_in_their_columns() {
+fn tex_fits_its_columns() {
     // Packages that `document` loads, and the metrics of its font.
     let files = [
         "mathptmx.sty",

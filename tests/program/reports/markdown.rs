@@ -4,6 +4,7 @@ use std::fs;
 
 use crate::support::house::House;
 use crate::support::run::{Bench, words};
+use crate::support::snapshot::{lines_with, redacted};
 use serde_json::Value;
 
 /// The lines of the only table in a text of Markdown.
@@ -12,7 +13,7 @@ fn table(text: &str) -> Vec<&str> {
 }
 
 #[test]
-fn findings_are_the_words_of_the_summary_and_cells_cannot_break_the_table() {
+fn markdown_repeats_findings_safely() {
     let bench = Bench::new();
     bench.rooms("frames", 8, "160x120");
     bench.file("a|`b`<b>.jsonl", "{\"default\": \"A\"}\n");
@@ -53,14 +54,17 @@ fn findings_are_the_words_of_the_summary_and_cells_cannot_break_the_table() {
 }
 
 #[test]
-fn runs_without_true_answers_and_open_questions_have_it_too() {
+fn open_and_unlabelled_runs_have_markdown() {
     let bench = Bench::new();
     bench.rooms("frames", 2, "96x64");
     bench.complete(&words(
         "--model random --data frames --ask home --levels L0,L3 --out own",
     ));
     let text = bench.complete(&words("report own --markdown"));
-    assert!(text.contains("without answers"), "{text}");
+    insta::assert_snapshot!(
+        lines_with(&text, "without answers"),
+        @"random · 50 questions without answers · 2 images · 250 replies, 0 failed · intervals by frame"
+    );
     assert!(table(&text).len() > 2, "{text}");
     let house = House::new();
     house.0.file("a.jsonl", "{\"default\": \"an answer\"}\n");
@@ -68,10 +72,19 @@ fn runs_without_true_answers_and_open_questions_have_it_too() {
     let line = "--model script:a.jsonl --judge script:j.jsonl --levels L0,L3 --out run";
     assert_eq!(house.call(&words(line)).code, Some(0));
     let text = house.0.complete(&words("report run --markdown"));
-    assert!(
-        text.contains("OpenEQA by LLM-Match, marked by script:j.jsonl"),
-        "{text}"
-    );
+    insta::assert_snapshot!(redacted(&text), @"
+    ### Seeing in the dark: run
+
+    OpenEQA by LLM-Match, marked by script:j.jsonl, protocol upstream · 6 of 6 answers scored
+
+    Score in % with 95 % intervals (difference from L0)
+
+    | model | light | L0 | L3 |
+    | --- | --- | ---: | ---: |
+    | script:a.jsonl | with noise | 75.0 (46.8–91.1) | 75.0 (0.0) (46.8–91.1) |
+
+    Made by darkqa-eval [VERSION].
+    ");
     // A mark of 4 is 75 %.
     assert!(
         table(&text).iter().any(|row| row.contains("| 75.0 (")),

@@ -12,6 +12,7 @@ use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::house::House;
 use crate::support::parquet_file::{body, metadata, rows};
 use crate::support::run::{Bench, model_args, records, words};
+use crate::support::snapshot::redacted;
 use crate::support::tools::{skip, succeeds};
 use serde_json::{Map, Value, json};
 
@@ -127,7 +128,7 @@ fn assert_rows_are_records(run: &Path) {
 }
 
 #[test]
-fn the_table_has_every_record_and_counts_as_the_summary_does() {
+fn record_table_matches_the_summary() {
     let bench = Bench::new();
     bench.rooms("frames", 4, "120x90");
     bench.complete(&words(
@@ -163,7 +164,7 @@ fn the_table_has_every_record_and_counts_as_the_summary_does() {
 }
 
 #[test]
-fn written_again_and_from_parts_it_is_the_same() {
+fn rebuilt_record_table_is_identical() {
     let bench = Bench::new();
     bench.rooms("frames", 6, "120x90");
     let args = "--model random --blind-model random --levels L0,L2 --data frames";
@@ -200,7 +201,7 @@ fn written_again_and_from_parts_it_is_the_same() {
 }
 
 #[test]
-fn failures_refusals_and_odd_texts_are_as_in_the_records() {
+fn record_table_keeps_odd_texts() {
     let bench = Bench::with_questions(4);
     let refused = json!({"role": "assistant", "content": null, "refusal": "I won't \u{1b}[1m."});
     let endpoint = MockEndpoint::start([
@@ -214,14 +215,11 @@ fn failures_refusals_and_odd_texts_are_as_in_the_records() {
         &base_url,
         "--data set.jsonl --levels L0 --concurrency 1 --out run",
     ));
-    assert_eq!(call.code, Some(1), "{call:?}");
-    assert!(
-        call.stderr.contains(
-            "numbers that are too large for the column prompt_tokens, and are null in it: 1;"
-        ),
-        "{}",
-        call.stderr
-    );
+    insta::assert_snapshot!(call.messages(), @"
+    exit code: 1
+     WARN run/records.parquet: numbers that are too large for the column prompt_tokens, and are null in it: 1;
+        records.jsonl has them
+    ");
     let rows = rows(&bench.path("run/records.parquet"));
     let all = records(&bench.path("run"));
     assert_eq!(rows.len(), 4);
@@ -264,7 +262,7 @@ fn failures_refusals_and_odd_texts_are_as_in_the_records() {
 }
 
 #[test]
-fn a_table_that_is_not_as_new_as_the_records_is_noticed() {
+fn outdated_record_table_is_noticed() {
     let bench = Bench::new();
     bench.rooms("frames", 2, "120x90");
     let args = "--model random --levels L0 --data frames --out run";
@@ -281,12 +279,11 @@ fn a_table_that_is_not_as_new_as_the_records_is_noticed() {
     lines.push('\n');
     fs::write(&log, &lines).unwrap();
     let kept = bench.call(&words("report run --no-parquet"));
-    assert!(
-        kept.stderr
-            .contains("records.parquet: not made from the records as they are now"),
-        "{}",
-        kept.stderr
-    );
+    insta::assert_snapshot!(kept.messages(), @"
+    exit code: 0
+     WARN run/records.parquet: not made from the records as they are now, and left as it is (--no-parquet); report
+        without --no-parquet writes it again
+    ");
     assert_eq!(fs::read(&path).unwrap(), whole);
     let length = |path: &Path| metadata(path)["darkqa.log_bytes"].clone();
     assert_ne!(length(&path), lines.len().to_string());
@@ -301,7 +298,7 @@ fn a_table_that_is_not_as_new_as_the_records_is_noticed() {
 }
 
 #[test]
-fn open_questions_have_a_row_an_answer_with_its_mark() {
+fn open_record_table_has_marks() {
     let house = House::new();
     house.0.file(
         "a.jsonl",
@@ -381,7 +378,7 @@ fn duckdb_counts_as_the_summary_does() {
 
 /// The example and the summary of a run agree on every model, level and variant.
 #[test]
-fn the_example_computes_the_accuracy_of_the_summary() {
+fn example_computes_accuracy_of_summary() {
     let run = Path::new(env!("CARGO_MANIFEST_DIR")).join("results/reference");
     let scores = accuracy::accuracy(&run).unwrap();
     let mut expected = BTreeMap::<[String; 3], accuracy::Score>::new();
@@ -401,7 +398,7 @@ fn the_example_computes_the_accuracy_of_the_summary() {
 }
 
 #[test]
-fn records_have_the_columns_and_rows_of_the_table() {
+fn exported_records_match_table() {
     let run = Path::new(env!("CARGO_MANIFEST_DIR")).join("results/reference");
     let records = darkqa_eval::StoredRun::open(&run)
         .unwrap()
@@ -413,8 +410,8 @@ fn records_have_the_columns_and_rows_of_the_table() {
     assert_eq!(first.text("key").unwrap().map(str::len), Some(32));
     assert_eq!(first.number("attempts").unwrap(), Some(1.0));
     let problem = first.text("levels").unwrap_err().to_string();
-    assert!(problem.contains("did you mean level?"), "{problem}");
+    insta::assert_snapshot!(redacted(&problem), @"levels: no such column of records; did you mean level?");
     let problem = first.number("level").unwrap_err().to_string();
-    assert!(problem.contains("no numbers"), "{problem}");
+    insta::assert_snapshot!(redacted(&problem), @"level: the column holds no numbers");
     assert!(darkqa_eval::StoredRun::open("no-such-run").is_err());
 }

@@ -4,6 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use crate::support::run::{Bench, called, records, words};
+use crate::support::snapshot::redacted;
 use crate::support::table::check_rows;
 use serde_json::{Value, json};
 
@@ -44,7 +45,10 @@ fn several_runs_become_one_comparison() {
     check_rows(rows, |label| {
         assert!(called.stdout.contains(label), "{label}: {called:?}");
     });
-    assert!(called.stdout.contains("report: all/report.html"));
+    insta::assert_snapshot!(called.lines_with("report:"), @"
+    exit code: 0
+    report: all/report.html
+    ");
     // A model that guesses is compared with no other.
     let compared = csv(&bench.path("all/comparisons.csv"));
     let compared: Vec<_> = compared.iter().filter(|row| row[0] == "model").collect();
@@ -93,19 +97,17 @@ fn several_runs_become_one_comparison() {
     }
     // Nothing is written where nothing is wanted.
     let called = bench.call(&["report", "one", "three"]);
-    assert!(
-        called
-            .stdout
-            .contains("report: not written; --out DIR writes one"),
-        "{called:?}"
-    );
+    insta::assert_snapshot!(called.lines_with("report:"), @"
+    exit code: 0
+    report: not written; --out DIR writes one
+    ");
     let json = bench.call(&["report", "one", "three", "--json"]);
     let json: Value = serde_json::from_str(&json.stdout).unwrap();
     assert_eq!(json["runs"].as_array().unwrap().len(), 2);
 }
 
 #[test]
-fn runs_that_cannot_be_compared_are_named() {
+fn incomparable_runs_are_named() {
     let bench = Bench::with_questions(3);
     run(&bench, "one", "");
     let text = fs::read_to_string(bench.path("set.jsonl")).unwrap();
@@ -115,36 +117,29 @@ fn runs_that_cannot_be_compared_are_named() {
     run(&bench, "foreign", "");
     let refused = |runs: [&str; 2]| bench.call(&["report", runs[0], runs[1]]);
     let strange = refused(["one", "strange"]);
-    assert_eq!(strange.code, Some(2));
-    assert!(
-        strange
-            .stderr
-            .contains("strange: the run shares no question with one"),
-        "{strange:?}"
-    );
+    insta::assert_snapshot!(strange.messages(), @"
+    exit code: 2
+    error: strange: the run shares no question with one; report each run alone
+    ");
     let foreign = refused(["one", "foreign"]);
-    assert!(
-        foreign
-            .stderr
-            .contains("has other choices or another true choice in one"),
-        "{foreign:?}"
-    );
+    insta::assert_snapshot!(foreign.messages(), @"
+    exit code: 2
+    error: foreign: the question q0 has other choices or another true choice in one; report each run alone
+    ");
     let none = refused(["one", "nowhere"]);
-    assert!(
-        none.stderr.contains("nowhere: no run in this folder"),
-        "{none:?}"
-    );
+    insta::assert_snapshot!(none.messages(), @"
+    exit code: 2
+    error: nowhere: no run in this folder: it has no manifest.json
+    ");
     let above = bench.call(&["report", "."]);
-    assert!(
-        above
-            .stderr
-            .contains("there are runs in it: ./foreign ./one ./strange"),
-        "{above:?}"
-    );
+    insta::assert_snapshot!(above.messages(), @"
+    exit code: 2
+    error: .: no run in this folder: it has no manifest.json; there are runs in it: ./foreign ./one ./strange
+    ");
 }
 
 #[test]
-fn broken_records_are_named_or_passed_over() {
+fn broken_records_are_named_or_skipped() {
     let bench = Bench::with_questions(3);
     run(&bench, "run", "");
     let path = bench.path("run/records.jsonl");
@@ -158,19 +153,17 @@ fn broken_records_are_named_or_passed_over() {
     // Something else among the lines.
     fs::write(&path, format!("{{\"a\": 1}}\n{whole}")).unwrap();
     let mixed = report();
-    assert_eq!(mixed.code, Some(2));
-    assert!(
-        mixed
-            .stderr
-            .contains("records.jsonl, line 1: not a record: missing field"),
-        "{mixed:?}"
-    );
+    insta::assert_snapshot!(mixed.messages(), @"
+    exit code: 2
+    error: run/records.jsonl, line 1: not a record: missing field `key` at line 1 column 8; the command that made
+        the run, called again, sets single such lines aside and asks their trials again; or restore the file
+    ");
     fs::write(&path, "").unwrap();
     let empty = report();
-    assert!(
-        empty.stderr.contains("run: the run has no records yet"),
-        "{empty:?}"
-    );
+    insta::assert_snapshot!(empty.messages(), @"
+    exit code: 2
+    error: run: the run has no records yet: nothing to report
+    ");
     // A run of another schema.
     fs::write(&path, &whole).unwrap();
     let manifest = fs::read_to_string(bench.path("run/manifest.json")).unwrap();
@@ -179,19 +172,17 @@ fn broken_records_are_named_or_passed_over() {
         manifest.replace("darkqa.run/2", "darkqa.run/9"),
     );
     let newer = report();
-    assert!(
-        newer
-            .stderr
-            .contains("the schema \"darkqa.run/9\" is not known to this version"),
-        "{newer:?}"
-    );
+    insta::assert_snapshot!(newer.messages(), @r#"
+    exit code: 2
+    error: run/manifest.json: the schema "darkqa.run/9" is not known to this version of darkqa-eval; the run was
+        made by version [VERSION]: read it with that
+    "#);
 }
 
 #[test]
-fn a_running_run_is_counted_by_its_records() {
+fn active_run_is_counted_by_records() {
     let bench = Bench::with_questions(3);
     run(&bench, "run", "");
-    let all = records(&bench.path("run")).len();
     let path = bench.path("run/records.jsonl");
     let text = fs::read_to_string(&path).unwrap();
     let some: String = text.split_inclusive('\n').take(2).collect();
@@ -203,8 +194,20 @@ fn a_running_run_is_counted_by_its_records() {
     manifest["counts"]["answered"] = 0.into();
     fs::write(&file, manifest.to_string()).unwrap();
     let report = bench.complete(&words("report run"));
-    let expected = format!("2 of {all} trials answered, 0 failed.");
-    assert!(report.contains(&expected), "{report}");
+    insta::assert_snapshot!(redacted(&report), @"
+    random · 2 questions · 1 frame · 2 replies, 0 failed · intervals by question
+    ! run: started: 2 of 9 trials answered, 0 failed. The same command asks the
+      rest.
+    ! Only 2 questions (8 are needed): intervals and tests are rough.
+
+     accuracy in %
+     random       L0   95 %
+     untouched   0.0   0.0 +65.8
+     95 %: how far the widest interval of the row reaches down and up
+     chance 33.3
+    run: run
+    report: run/report.html
+    ");
 }
 
 #[test]
@@ -233,16 +236,17 @@ fn runs_of_earlier_versions_are_read() {
     });
     fs::write(bench.path("run/records.jsonl"), lines.collect::<String>()).unwrap();
     let called = bench.call(&["report", "run", "--full"]);
-    assert_eq!(called.code, Some(0), "{called:?}");
-    assert!(called.stdout.contains("chance: 33.33 over 3 questions"));
+    insta::assert_snapshot!(called.lines_with("chance"), @"
+    exit code: 0
+    chance: 33.33 over 3 questions
+    Darkness threshold in EV (half-way from L0 to chance) and mean accuracy in %, with 95 % intervals by question
+    ");
     assert!(bench.path("run/report.html").is_file());
     let called = bench.call(&["show", "run", "q0"]);
-    assert!(
-        called
-            .stderr
-            .contains("the manifest of the run has no image flags"),
-        "{called:?}"
-    );
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 2
+    error: run: the manifest of the run has no image flags, so its images cannot be made again
+    ");
 }
 
 #[test]
@@ -288,23 +292,19 @@ fn what_was_sent_is_made_again() {
         3
     );
     let missing = bench.call(&["show", "run", id, "--condition", "L1-ev"]);
-    assert!(
-        missing
-            .stderr
-            .contains("the item was not asked at L1-ev; it was at L0, L4-ev, L4-noise"),
-        "{missing:?}"
-    );
+    insta::assert_snapshot!(missing.messages(), @"
+    exit code: 2
+    error: --condition: the item was not asked at L1-ev; it was at L0, L4-ev, L4-noise
+    ");
     let nobody = bench.call(&["show", "run", "nothing"]);
-    assert!(
-        nobody
-            .stderr
-            .contains("no question \"nothing\" in this run"),
-        "{nobody:?}"
-    );
+    insta::assert_snapshot!(nobody.messages(), @r#"
+    exit code: 2
+    error: run: no question "nothing" in this run; report.html and questions.jsonl have their ids
+    "#);
 }
 
 #[test]
-fn an_item_is_drawn_as_one_picture() {
+fn item_is_drawn_as_one_picture() {
     let bench = Bench::new();
     let rooms = "rooms:frames=3,size=96x64";
     bench.complete(&words(&format!(
@@ -319,15 +319,25 @@ fn an_item_is_drawn_as_one_picture() {
         bench.call(&words)
     };
     let drawn = draw(&[]);
-    assert_eq!(drawn.code, Some(0), "{drawn:?}");
-    assert!(drawn.stdout.contains("not drawn: L4-ev\n"), "{drawn:?}");
+    insta::assert_snapshot!(drawn, @"
+    exit code: 0
+    stdout:
+    item.png: the item over the levels
+    not drawn: L4-ev
+    ");
     let picture = image::open(bench.path("item.png")).unwrap();
     assert!(picture.width() > 500 && picture.height() > 400);
     // Other rooms are other images.
     let other = draw(&["--data", "rooms:frames=3,size=96x64,seed=8"]);
     assert_eq!(other.code, Some(1), "{other:?}");
-    let changed = "NOT the bytes that were sent: L0, L4-noise, L4-noise+gray-gain, L4-noise+lift;";
-    assert!(other.stdout.contains(changed), "{other:?}");
+    insta::assert_snapshot!(other, @"
+    exit code: 1
+    stdout:
+    item.png: the item over the levels
+    not drawn: L4-ev
+    NOT the bytes that were sent: L0, L4-noise, L4-noise+gray-gain, L4-noise+lift; the data, an enhancer or this
+        program has changed since the run
+    ");
     bench.complete(&words(&format!(
         "--model random --levels L0 --limit 3 --data {rooms} --out light"
     )));
@@ -343,7 +353,10 @@ fn an_item_is_drawn_as_one_picture() {
         },
     );
     let refused = bench.call(&["show", "run", id, "--sheet", "item.gif"]);
-    assert!(refused.stderr.contains(".png or .jpg"), "{refused:?}");
+    insta::assert_snapshot!(refused.messages(), @"
+    exit code: 2
+    error: --sheet: item.gif: a name that ends in .png or .jpg expected
+    ");
 }
 
 #[test]
@@ -357,13 +370,11 @@ fn people_enter_as_a_model() {
     let line = "--model script:said.jsonl --data set.jsonl --levels L0,L5 --out run";
     bench.complete(&words(line));
     let packed = bench.call(&["study", "pack", "run", "--out", "pack"]);
-    assert_eq!(packed.code, Some(0), "{packed:?}");
-    assert!(
-        packed
-            .stdout
-            .contains("6 questions, 3 images, 3 conditions"),
-        "{packed:?}"
-    );
+    insta::assert_snapshot!(packed, @"
+    exit code: 0
+    stdout:
+    pack/study.html: 6 questions, 3 images, 3 conditions; with 3 people each image is seen by one of them
+    ");
     let page = fs::read_to_string(bench.path("pack/study.html")).unwrap();
     assert!(!page.contains("truth"));
     assert_eq!(fs::read_dir(bench.path("pack/images")).unwrap().count(), 3);
@@ -430,12 +441,10 @@ fn people_enter_as_a_model() {
         .sum();
     assert_eq!(cannot_tell, 6);
     let again = bench.call(&["report", "people", "--rescore"]);
-    assert!(
-        again
-            .stdout
-            .contains("0 of 18 records now read differently"),
-        "{again:?}"
-    );
+    insta::assert_snapshot!(again.lines_with("read differently"), @"
+    exit code: 0
+    0 of 18 records now read differently
+    ");
     // People are in no mean over models, and take no question from it.
     let pooled = csv(&bench.path("both/pooled.csv"));
     let names = pooled[0].iter().position(|name| name == "names").unwrap();
@@ -445,7 +454,13 @@ fn people_enter_as_a_model() {
             .all(|row| row[names] == "script:said.jsonl"),
         "{pooled:?}"
     );
-    assert!(both.stdout.contains("people (people)"), "{}", both.stdout);
+    insta::assert_snapshot!(both.lines_with("people"), @"
+    exit code: 0
+    script:said.jsonl, people (people) · 6 questions · 1 frame · 36 replies, 0 failed · intervals by question
+     people            100.0    0.0   −39.8 +39.0
+     6 answers of people are “I cannot tell”, which counts as wrong and not as
+    run: people
+    ");
     let rows = csv(&bench.path("both/comparisons.csv"));
     let held = rows
         .iter()
@@ -475,16 +490,14 @@ fn people_enter_as_a_model() {
     assert!(read.stdout.contains(counted), "{read:?}");
     bench.file("answers.jsonl", "{\"question\": 1}\n");
     let broken = bench.call(&args);
-    assert!(
-        broken
-            .stderr
-            .contains("answers.jsonl, line 1: missing field `condition`"),
-        "{broken:?}"
-    );
+    insta::assert_snapshot!(broken.messages(), @"
+    exit code: 2
+    error: answers.jsonl, line 1: missing field `condition`
+    ");
 }
 
 #[test]
-fn no_line_of_all_tables_is_wider_than_the_terminal() {
+fn tables_fit_the_terminal() {
     let bench = Bench::with_questions(12);
     // Names of thirty letters.
     let models = ["a", "b"].map(|end| format!("a-model-of-thirty-letters-72-{end}.jsonl"));
@@ -509,7 +522,7 @@ fn no_line_of_all_tables_is_wider_than_the_terminal() {
 }
 
 #[test]
-fn signs_have_colours_where_they_are_wanted() {
+fn symbols_are_coloured_on_demand() {
     let bench = Bench::with_questions(12);
     run(&bench, "one", "");
     run(&bench, "two", "--seed 1");

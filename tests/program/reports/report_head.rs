@@ -62,7 +62,7 @@ fn every_length_and_every_syntax_combine() {
 }
 
 #[test]
-fn training_data_of_an_enhancer_are_next_to_its_results() {
+fn enhancer_training_data_is_reported() {
     let bench = Bench::new();
     enhanced(&bench);
     let trained = "lift: trained on this program's synthesis";
@@ -101,7 +101,7 @@ fn training_data_of_an_enhancer_are_next_to_its_results() {
 }
 
 #[test]
-fn the_page_opens_with_its_summary_and_what_fails_first() {
+fn page_opens_with_summary() {
     let bench = Bench::with_questions(6);
     let mut replies = "{\"default\": \"C\"}\n".to_owned();
     for i in 0..6 {
@@ -130,7 +130,7 @@ fn the_page_opens_with_its_summary_and_what_fails_first() {
 }
 
 #[test]
-fn the_page_of_open_questions_opens_with_its_scores() {
+fn open_page_opens_with_scores() {
     let house = House::new();
     house.0.file("m.jsonl", "{\"default\": \"a sofa\"}\n");
     house.0.file("j.jsonl", "{\"default\": \"4\"}\n");

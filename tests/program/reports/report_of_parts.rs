@@ -51,7 +51,7 @@ fn report_in(bench: &Bench, folder: &str) -> String {
 }
 
 #[test]
-fn parts_report_what_the_merged_run_does() {
+fn parts_report_what_merged_run_does() {
     let bench = Bench::new();
     for part in ["1/3", "2/3", "3/3"] {
         bench.complete(&evaluation(&format!("--out a --shard {part}")));
@@ -101,16 +101,15 @@ fn parts_report_what_the_merged_run_does() {
         assert_eq!(fs::read_dir(bench.path("elsewhere")).unwrap().count(), 0);
     }
     let refused = bench.call(&words("report a --rescore"));
-    assert_eq!(refused.code, Some(2), "{refused:?}");
-    assert!(
-        refused.stderr.contains("a holds the parts of a run"),
-        "{}",
-        refused.stderr
-    );
+    insta::assert_snapshot!(refused.messages(), @"
+    exit code: 2
+    error: --rescore: a holds the parts of a run, and their readings are stored in each: name the parts, or merge
+        them with report merge, which reads all replies again
+    ");
 }
 
 #[test]
-fn what_parts_lack_is_said_with_the_command_that_asks_it() {
+fn missing_shards_name_their_command() {
     let bench = Bench::new();
     bench.complete(&words("plan --model observer --levels L0,L3 --out a"));
     let flags = "--model observer --levels L0,L3";
@@ -118,21 +117,17 @@ fn what_parts_lack_is_said_with_the_command_that_asks_it() {
         bench.complete(&words(&format!("{flags} --out a --shard {part}")));
     }
     let reported = bench.call(&words("report a"));
-    assert_eq!(reported.code, Some(0), "{reported:?}");
-    assert!(
-        reported
-            .stderr
-            .contains("1 shard is missing: 2/3 (2 of 6 frames, "),
-        "{}",
-        reported.stderr
-    );
+    insta::assert_snapshot!(reported.messages(), @"
+    exit code: 0
+     WARN 1 shard is missing: 2/3 (2 of 6 frames, 39 trials); the summary covers only the others; darkqa-eval
+        --model observer --levels L0,L3 --out a --shard 2/3 asks what is left
+    ");
     let command = reported.stderr.split("only the others; ").nth(1).unwrap();
     let command = command.split(" asks what is left").next().unwrap();
-    assert!(
-        reported.stdout.contains("a: incomplete:"),
-        "{}",
-        reported.stdout
-    );
+    insta::assert_snapshot!(reported.lines_with("incomplete"), @"
+    exit code: 0
+    ! a: incomplete: 75 of 75 trials answered, 0 failed.
+    ");
     let before = fs::read(bench.path("a/summary.csv")).unwrap();
     let partial = bench.call(&words("merge a --out partial/a --partial"));
     assert_eq!(partial.code, Some(1), "{partial:?}");
@@ -150,10 +145,9 @@ fn what_parts_lack_is_said_with_the_command_that_asks_it() {
     )
     .unwrap();
     let refused = bench.call(&words("report a"));
-    assert_eq!(refused.code, Some(2), "{refused:?}");
-    assert!(
-        refused.stderr.contains("is of another run than"),
-        "{}",
-        refused.stderr
-    );
+    insta::assert_snapshot!(refused.messages(), @"
+    exit code: 2
+    error: a/shard-2-of-3-other: shard 2/3 is of another run than a/shard-1-of-3: its --seed is 9, that of the
+        other run is 0
+    ");
 }

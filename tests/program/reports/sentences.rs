@@ -78,7 +78,7 @@ fn texts<'f>(findings: &'f [Value], kind: &str) -> Vec<&'f str> {
 }
 
 #[test]
-fn no_in_the_dark_is_said_where_it_grows() {
+fn growing_no_is_a_finding() {
     let bench = bench();
     let (said, rows) = findings(&bench, "dark", |answer, condition| {
         let is_dark = condition == "L5-noise";
@@ -111,7 +111,7 @@ fn no_in_the_dark_is_said_where_it_grows() {
 }
 
 #[test]
-fn no_that_does_not_grow_and_replies_that_cannot_be_read_are_no_hallucination() {
+fn hallucination_ignores_unread_replies() {
     let bench = bench();
     // “no” at every level, also at L0: no growth, and no collapse in the dark.
     let (said, rows) = findings(&bench, "always", |_, _| "no".to_owned());

@@ -28,7 +28,7 @@ fn cells(bench: &Bench, folder: &str) -> Vec<(String, String)> {
 }
 
 #[test]
-fn a_family_or_model_that_looks_like_a_formula_is_only_text() {
+fn formulas_stay_text() {
     let bench = Bench::with_questions(12);
     let set = fs::read_to_string(bench.path("set.jsonl")).unwrap();
     let family = serde_json::to_string(FAMILY).unwrap();
@@ -72,7 +72,7 @@ fn a_family_or_model_that_looks_like_a_formula_is_only_text() {
 }
 
 #[test]
-fn a_set_that_is_written_for_other_tools_is_read_back_as_it_was() {
+fn exported_set_reads_back_unchanged() {
     let bench = Bench::with_questions(2);
     let set = fs::read_to_string(bench.path("set.jsonl")).unwrap();
     bench.file(

@@ -142,7 +142,7 @@ fn a_damaged_manifest_is_made_again() {
 }
 
 #[test]
-fn a_manifest_is_not_made_from_another_command() {
+fn manifest_needs_the_same_command() {
     let scene = Scene::new();
     Damage::Binary.apply(&scene.bench.path("run/manifest.json"));
     for other in [
@@ -163,7 +163,7 @@ fn a_manifest_is_not_made_from_another_command() {
 }
 
 #[test]
-fn lost_questions_are_not_made_from_other_data() {
+fn lost_questions_need_same_data() {
     for damage in [Damage::Binary, Damage::Empty] {
         let scene = Scene::new();
         let set = scene.bench.path("set.jsonl");

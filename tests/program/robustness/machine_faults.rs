@@ -91,7 +91,7 @@ impl Scene {
         child
     }
 
-    /// Kills the run in a folder once there are so many records.
+    /// Kills the run in a folder once it has `records` records.
     fn kill_at(&self, out: &str, records: usize) {
         let mut child = self.spawned(out, records);
         signal(&child, "-9");
@@ -152,7 +152,7 @@ fn kills_cost_what_was_in_flight() {
 
 #[cfg(unix)]
 #[test]
-fn a_full_disk_stops_a_run_that_goes_on_when_there_is_room() {
+fn full_disk_stops_until_room() {
     check_rows(BOTH, |is_open| {
         let scene = Scene::new(is_open, Duration::ZERO);
         // A limit of 16 blocks of 512 bytes for each file, as a write error in place of a signal.
@@ -172,7 +172,7 @@ fn a_full_disk_stops_a_run_that_goes_on_when_there_is_room() {
 }
 
 #[test]
-fn a_second_process_is_refused_and_asks_nothing() {
+fn second_process_is_refused() {
     check_rows(BOTH, |is_open| {
         let scene = Scene::new(is_open, Duration::from_millis(40));
         let mut first = scene.spawned("run", 2);
@@ -220,7 +220,7 @@ fn set_times(folder: &Path, time: SystemTime) {
 
 #[cfg(unix)]
 #[test]
-fn a_folder_that_cannot_be_written_to_costs_no_request() {
+fn unwritable_folder_costs_no_request() {
     use std::os::unix::fs::PermissionsExt as _;
 
     check_rows(BOTH, |is_open| {

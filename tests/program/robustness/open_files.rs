@@ -37,7 +37,7 @@ fn assert_complete((output, bench, endpoint): &(Called, Bench, MockEndpoint)) {
 }
 
 #[test]
-fn few_open_files_limit_the_requests_in_flight() {
+fn few_open_files_limit_requests() {
     let rows = [(24, 32), (64, 32), (64, 256), (128, 128), (128, 256)];
     check_rows(rows, |(files, concurrency)| {
         let limit = format!("ulimit -n {files};");
@@ -69,7 +69,7 @@ fn several_endpoints_share_the_open_files() {
 }
 
 #[test]
-fn the_soft_limit_is_raised_to_the_hard_one() {
+fn soft_file_limit_is_raised() {
     let ran = run("ulimit -Sn 64;", "--concurrency 64");
     assert_complete(&ran);
     assert!(!ran.0.stderr.contains("instead of"), "{:?}", ran.0);

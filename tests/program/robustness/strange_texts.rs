@@ -51,7 +51,7 @@ fn hidden(text: &str) -> Vec<char> {
 }
 
 #[test]
-fn names_of_a_run_are_shown_and_do_nothing() {
+fn hostile_run_names_are_inert() {
     let bench = Bench::with_questions(8);
     bench.file("m.jsonl", "{\"default\": \"A\"}\n");
     bench.complete(&words(

@@ -41,7 +41,7 @@ fn an_evaluation_with_an_enhancer() {
 }
 
 #[test]
-fn an_evaluation_at_a_drop_of_its_own_in_two_readings() {
+fn custom_drop_under_two_profiles() {
     let bench = Bench::new();
     bench.complete(&words(
         "--model observer --data rooms:frames=4,size=160x120 --levels L0,3.3 \
@@ -51,7 +51,7 @@ fn an_evaluation_at_a_drop_of_its_own_in_two_readings() {
 }
 
 #[test]
-fn open_questions_with_marks_and_an_enhancer() {
+fn open_questions_with_marks_and_enhancer() {
     let house = House::new();
     onnx::gain(2.0).write(&house.0.path(""), "bright.onnx");
     house.0.file(

@@ -169,7 +169,7 @@ impl Scene {
         assert_eq!(self.kept(out), kept, "{otherwise}");
     }
 
-    /// A command on the folder of a run asks so many new trials, and none of those that are there.
+    /// Asserts that a command on a run's folder asks `new` new trials and no existing one.
     fn adds(&self, flags: &Flags, otherwise: &str, out: &str, new: usize) {
         let (asked, kept) = (self.endpoint.requests().len(), self.kept(out));
         self.complete(flags, otherwise, out);
@@ -282,7 +282,7 @@ const OPEN_REFUSED: [(&str, &str); 29] = [
 ];
 
 #[test]
-fn every_field_of_an_evaluation_refuses_another_value() {
+fn evaluation_fields_refuse_other_values() {
     let scene = Scene::new();
     let enhanced = |otherwise: &str| format!("--limit 1 --llie one.onnx --llie-anyway {otherwise}");
     scene.complete(&EVALUATION, &enhanced(""), "run");
@@ -292,7 +292,7 @@ fn every_field_of_an_evaluation_refuses_another_value() {
 }
 
 #[test]
-fn every_field_of_open_questions_refuses_another_value() {
+fn open_fields_refuse_other_values() {
     let scene = Scene::new();
     let enhanced = |otherwise: &str| format!("--limit 1 --llie one.onnx --llie-anyway {otherwise}");
     scene.complete(&OPEN, &enhanced(""), "run");
@@ -353,7 +353,7 @@ const ADDITIONS: [Addition; 23] = [
     ("", "--observer-controls", 0),
 ];
 
-/// What may be added to a run of open questions.
+/// Additions that a run of open questions accepts.
 const OPEN_ADDITIONS: [Addition; 10] = [
     ("", "--model m --model n", 6),
     ("", "--model n", 6),
@@ -375,7 +375,7 @@ const OPEN_ADDITIONS: [Addition; 10] = [
     ("--limit 2", "--limit 3", 2),
 ];
 
-/// What changes no answer: given on the folder of a run, it asks nothing.
+/// Settings that change no answer: on a run's folder they ask nothing.
 const NOTHING: [&str; 42] = [
     "--max-pixels 1000000",
     "--threads 1",
@@ -482,11 +482,8 @@ const ELSEWHERE: [(&str, &str); 60] = [
         "--colour",
         "it changes images of other colours than sRGB: tests/program/data/inputs/colour.rs",
     ),
-    ("--auto", "settings_of_the_camera_are_those_of_its_variants"),
-    (
-        "--motion",
-        "settings_of_the_camera_are_those_of_its_variants",
-    ),
+    ("--auto", "camera_settings_follow_variants"),
+    ("--motion", "camera_settings_follow_variants"),
     ("--llie-anyway", "tests/program/images/enhance/probe.rs"),
     ("--enhanced", "tests/program/images/enhance/elsewhere.rs"),
     ("--models", "tests/program/models/models_file.rs"),
@@ -591,7 +588,7 @@ fn class_of_row(row: &'static str) -> Option<(&'static str, &'static str)> {
 }
 
 #[test]
-fn every_flag_is_held_to_what_it_decides() {
+fn every_flag_has_its_effect() {
     let first = |args: &&'static str| args.split(' ').next().unwrap();
     let refused = REFUSED
         .iter()
@@ -628,7 +625,7 @@ fn every_flag_is_held_to_what_it_decides() {
 }
 
 #[test]
-fn another_value_of_a_column_is_asked_alone() {
+fn other_column_value_is_asked() {
     let scene = Scene::new();
     for (flags, additions) in [(&EVALUATION, &ADDITIONS[..]), (&OPEN, &OPEN_ADDITIONS)] {
         for (before, then, new) in additions {
@@ -640,7 +637,7 @@ fn another_value_of_a_column_is_asked_alone() {
 }
 
 #[test]
-fn a_run_to_which_something_is_added_is_no_longer_complete_until_it_is_asked() {
+fn grown_run_is_incomplete_until_asked() {
     let scene = Scene::new();
     scene.complete(&EVALUATION, "", "run");
     let manifest = || -> Value {
@@ -664,7 +661,7 @@ fn a_run_to_which_something_is_added_is_no_longer_complete_until_it_is_asked() {
 }
 
 #[test]
-fn the_key_of_a_trial_has_what_decides_its_image() {
+fn trial_key_covers_the_image() {
     let scene = Scene::new();
     let keys = |otherwise: &str| scene.keys(&EVALUATION, otherwise);
     let enhanced = |otherwise: &str| keys(&format!("--llie one.onnx --llie-anyway {otherwise}"));
@@ -689,7 +686,7 @@ fn the_key_of_a_trial_has_what_decides_its_image() {
 
 /// The camera's settings are in the keys, and in the manifest, of the variants that they decide, and of no other.
 #[test]
-fn settings_of_the_camera_are_those_of_its_variants() {
+fn camera_settings_follow_variants() {
     const ALL: &str = "--variant all --levels L0,L3,T33.33";
     let scene = Scene::new();
     let keys = |otherwise: &str| scene.keys(&EVALUATION, &format!("{ALL} {otherwise}"));
@@ -745,7 +742,7 @@ fn settings_of_the_camera_are_those_of_its_variants() {
 }
 
 #[test]
-fn the_key_of_an_answer_has_what_decides_its_images() {
+fn answer_key_covers_its_images() {
     let scene = Scene::new();
     let keys = |otherwise: &str| scene.keys(&OPEN, otherwise);
     let enhanced = |otherwise: &str| keys(&format!("--llie one.onnx --llie-anyway {otherwise}"));
@@ -802,7 +799,7 @@ const SIDECARS: [(&str, &str, &[&str]); 4] = [
 ];
 
 #[test]
-fn what_a_sidecar_says_of_pixels_is_another_enhancer() {
+fn sidecar_decoding_makes_another_enhancer() {
     let scene = Scene::new();
     let bench = &scene.house.0;
     onnx::two_outputs().write(&bench.path(""), "outputs.onnx");
@@ -831,7 +828,7 @@ fn what_a_sidecar_says_of_pixels_is_another_enhancer() {
 }
 
 #[test]
-fn what_a_preset_says_of_pixels_is_another_enhancer() {
+fn preset_decoding_makes_another_enhancer() {
     let scene = Scene::new();
     let said =
         |model: &str| format!("--levels L3 --variant noise --limit 1 --llie-anyway --llie {model}");
@@ -859,7 +856,7 @@ const DEFAULTS: [&str; 11] = [
 ];
 
 #[test]
-fn a_default_that_is_written_out_changes_nothing() {
+fn explicit_default_changes_nothing() {
     let scene = Scene::new();
     let said = "--levels L3 --limit 1 --llie-anyway --llie one.onnx";
     scene.complete(&EVALUATION, said, "run");

@@ -78,12 +78,10 @@ fn images_are_synthesized_in_parts() {
     assert_eq!(whole.len(), 7 * 3 * 2);
     assert_together(&whole, &parts);
     let empty = bench.call(&words("synthesize frames --out x --shard 8/8"));
-    assert_eq!(empty.code, Some(2), "{empty:?}");
-    assert!(
-        empty.stderr.contains("8/8 is empty: there are 7 frames"),
-        "{}",
-        empty.stderr
-    );
+    insta::assert_snapshot!(empty.messages(), @"
+    exit code: 2
+    error: --shard: 8/8 is empty: there are 7 frames; use at most as many parts
+    ");
     let both = bench.call(&words("synthesize --check whole --shard 1/2"));
     assert_eq!(both.code, Some(2), "{both:?}");
 }
@@ -135,7 +133,7 @@ fn sets_are_exported_in_parts() {
 }
 
 #[test]
-fn questions_are_made_from_what_parts_measured() {
+fn shard_measurements_make_questions() {
     let bench = with_frames();
     bench.complete(&words("questions frames --out whole/q.jsonl"));
     for part in ["1/3", "2/3", "3/3"] {

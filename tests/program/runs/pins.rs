@@ -11,6 +11,7 @@ use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::house::House;
 use crate::support::onnx;
 use crate::support::run::{Bench, called, records, words};
+use crate::support::snapshot::redacted;
 use crate::support::table::check_rows;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
@@ -31,7 +32,7 @@ const FAMILIES: [&str; 2] = ["color", "presence"];
 const OF_EACH: usize = 12;
 const CONDITIONS: [&str; 5] = ["L0", "L1-ev", "L1-noise", "L4-ev", "L4-noise"];
 
-/// How many of the questions of each family a model gets right in each condition: the first so many.
+/// Number of right replies per family and condition; the first questions are right.
 const SKILLS: [(&str, [[usize; 2]; 5]); 3] = [
     ("a", [[12, 12], [12, 7], [10, 9], [4, 3], [1, 2]]),
     ("b", [[6, 9], [10, 4], [9, 4], [3, 3], [8, 0]]),
@@ -102,7 +103,7 @@ fn exam() -> Bench {
 }
 
 #[test]
-fn holm_corrects_within_a_pair_of_models_and_a_kind() {
+fn holm_corrects_within_models_and_kind() {
     let bench = exam();
     let line = "--data set.jsonl --model script:a.jsonl --model script:b.jsonl --model script:c.jsonl --levels L0,L1,L4 \
                 --out run";
@@ -180,7 +181,7 @@ fn holm_corrects_within_a_pair_of_models_and_a_kind() {
 // ---- A torn last line ----
 
 #[test]
-fn a_long_torn_line_is_cut_off_whole() {
+fn long_torn_line_is_removed() {
     const STEP: usize = 64 * 1024;
     let bench = Bench::with_questions(3);
     let endpoint = MockEndpoint::start([Answer::text("C")]);
@@ -239,7 +240,7 @@ fn outage(length: usize) -> (Option<i32>, String, usize) {
 }
 
 #[test]
-fn an_outage_of_fewer_than_three_windows_is_survived() {
+fn outage_under_three_windows_survives() {
     let (code, output, failed) = outage(30);
     assert_eq!((code, failed), (Some(1), 30), "{output}");
     let (code, output, failed) = outage(59);
@@ -247,10 +248,13 @@ fn an_outage_of_fewer_than_three_windows_is_survived() {
 }
 
 #[test]
-fn an_outage_of_three_windows_stops_the_run() {
+fn outage_of_three_windows_stops_run() {
     let (code, output, failed) = outage(1000);
     assert_eq!(code, Some(2), "{output}");
-    assert!(output.contains("m: 60 trials in a row failed"), "{output}");
+    insta::assert_snapshot!(redacted(&output), @"
+    error: http://127.0.0.1:[PORT]/v1: m: 60 trials in a row failed: http://127.0.0.1:[PORT]/v1 answered 500: out
+        of order (replies so far are stored; the same command continues)
+    ");
     // Those that were under way then, and no more.
     assert!((60..100).contains(&failed), "{failed}: {output}");
 }
@@ -258,7 +262,7 @@ fn an_outage_of_three_windows_stops_the_run() {
 // ---- The frames that a report shows ----
 
 #[test]
-fn small_copies_are_kept_of_the_frames_of_lowest_digest() {
+fn thumbnails_follow_lowest_digests() {
     const FRAMES: usize = 60;
     const MOST: usize = 48;
     let bench = Bench::new();
@@ -320,13 +324,12 @@ fn cut_report(cut: usize, output: &Value) -> String {
 }
 
 #[test]
-fn a_limit_that_cuts_most_replies_is_warned_of() {
+fn truncating_limit_warns() {
     let output = cut_report(6, &Value::Null);
-    assert!(
-        output.contains("6 of the first 10 replies were cut at the token limit")
-            && output.contains("--max-tokens"),
-        "{output}"
-    );
+    insta::assert_snapshot!(redacted(&output), @"
+    WARN 6 of the first 10 replies were cut at the token limit before any text: a reasoning model needs a larger
+       --max-tokens, or a lower --reasoning-effort
+    ");
     let rows = [(5, Value::Null), (10, json!("The answer is C"))];
     check_rows(rows, |(cut, words)| {
         let output = cut_report(cut, &words);
@@ -390,16 +393,26 @@ fn counts(house: &House) -> BTreeMap<String, usize> {
 }
 
 #[test]
-fn enhanced_walks_go_through_batch_and_page() {
+fn enhanced_walks_use_batch_and_page() {
     let house = bright_house();
     let silent = MockEndpoint::start([Answer::error(400, "bad", "must not be asked")]);
     let line = format!("{OPEN} {}", silent.base_url());
     let batch = format!("{line} --batch");
     let called = house.call(&words(&batch));
-    assert!(
-        called.stdout.contains("9 requests in 1 file;"),
-        "{called:?}"
-    );
+    insta::assert_snapshot!(called, @"
+    exit code: 0
+    stdout:
+    9 requests in 1 file; 0 already answered, 0 waiting for an earlier batch
+    run/batch/1-m-001.jsonl (9 requests)
+    upload each file to the Batch API, then run: darkqa-eval batch import run OUTPUT.jsonl ERRORS.jsonl …
+    then run the same command again, for the remaining requests and the marks
+    stderr:
+     WARN 1 of 2 walks has fewer frames than --num-frames 3: they are shown several times in a request, as
+        upstream does (the 2 frames of scannet-v0/001-b, for example)
+     WARN bright: on 4 of 6 dark frames its images are flat (brightness varies by 0.0 of 255). No usual value
+        range fits (0..1, 0..255, -1..1, -0.5..0.5, mean and std of ImageNet or CLIP); perhaps it needs another
+        `mean` and `std`, another output is the image, or the export has lost its weights
+    ");
     let requests = answer_batch(&house, "run/batch/1-m-001.jsonl", "It is brown");
     let mut light = BTreeMap::<String, Vec<f64>>::new();
     for trial in lines(&house.0.path("run/batch/trials.jsonl")) {
@@ -422,14 +435,27 @@ fn enhanced_walks_go_through_batch_and_page() {
     }
     let called = house.call(&words(&batch));
     // One mark for each question: all conditions were answered alike.
-    assert!(
-        called.stdout.contains("3 requests in 1 file;"),
-        "{called:?}"
-    );
+    insta::assert_snapshot!(called, @"
+    exit code: 0
+    stdout:
+    3 requests in 1 file; 0 already answered, 0 waiting for an earlier batch
+    run/batch/1-j-001.jsonl (3 requests)
+    upload each file to the Batch API, then run: darkqa-eval batch import run OUTPUT.jsonl ERRORS.jsonl …
+    stderr:
+     WARN 1 of 2 walks has fewer frames than --num-frames 3: they are shown several times in a request, as
+        upstream does (the 2 frames of scannet-v0/001-b, for example)
+    ");
     answer_batch(&house, "run/batch/1-j-001.jsonl", "Your mark: 4");
     let called = house.call(&words(&line));
-    assert_eq!(called.code, Some(0), "{called:?}");
-    assert!(called.stdout.contains("bright"), "{}", called.stdout);
+    insta::assert_snapshot!(called.lines_with("bright"), @"
+    exit code: 0
+    ! bright was used because of --allow bad-enhancer although its images may be read in a wrong way: on 4 of 6
+        dark frames its images are flat (brightness varies by 0.0 of 255). No usual value range fits (0..1,
+        0..255, -1..1, -0.5..0.5, mean and std of ImageNet or CLIP); perhaps it needs another `mean` and `std`,
+        another output is the image, or the export has lost its weights.
+     m       with noise + bright          75.0 (0.0)   3 of 3   −28.2 +16.1
+     m       with noise + bright   hm3d-v0                        75.0 (0.0)   −57.6 +22.7
+    ");
     assert!(silent.requests().is_empty());
     let each = ["L0", "L3-noise", "L3-noise+bright", "marks"];
     assert_eq!(counts(&house), each.map(|name| (name.to_owned(), 3)).into());
@@ -449,7 +475,7 @@ fn enhanced_walks_go_through_batch_and_page() {
 }
 
 #[test]
-fn enhanced_walks_go_on_where_they_were_stopped() {
+fn stopped_enhanced_walks_resume() {
     let house = bright_house();
     let answered = std::iter::repeat_n(Answer::text("one"), 4);
     let refused = Answer::error(401, "invalid_api_key", "no");
@@ -485,7 +511,7 @@ fn enhanced_walks_go_on_where_they_were_stopped() {
 // ---- Replies without an answer ----
 
 #[test]
-fn a_null_or_refused_reply_is_no_answer() {
+fn null_or_refused_reply_is_unanswered() {
     let house = House::new();
     let model = MockEndpoint::start([
         Answer::message(&json!({"content": null}), "stop"),
@@ -506,7 +532,15 @@ fn a_null_or_refused_reply_is_no_answer() {
     let requests = judge.requests();
     assert_eq!(requests.len(), 1, "the judge is sent what is an answer");
     let prompt = requests[0].json()["messages"][0]["content"].to_string();
-    assert!(prompt.contains("Response: No"), "{prompt}");
+    insta::assert_snapshot!(redacted(&prompt), @r#"
+    "You are an AI assistant who will help me to evaluate the response given the question and the correct
+        answer.\nTo mark a response, you should output a single integer between 1 and 5 (including 1, 5).\n5 means
+        that the response perfectly matches the answer.\n1 means that the response is completely different from
+        the answer.\n\nExample 1:\nQuestion: Is it overcast?\nAnswer: no\nResponse: yes\nYour mark: 1\n\nExample
+        2:\nQuestion: Who is standing at the table?\nAnswer: woman\nResponse: Jessica\nYour mark: 3\n\nExample
+        3:\nQuestion: Are there drapes to the right of the bed?\nAnswer: yes\nResponse: yes\nYour mark: 5\n\nYour
+        Turn:\nQuestion: Is it “safe”?\nAnswer: No\nResponse: No"
+    "#);
     assert_eq!(
         house.read("run/upstream/m-L0.json"),
         json!([
@@ -528,11 +562,10 @@ fn a_null_or_refused_reply_is_no_answer() {
         .unwrap();
     assert_eq!((&row["n"], &row["null"]), (&json!(3), &json!(2)));
     assert!((row["value"].as_f64().unwrap() - 1.0 / 3.0).abs() < 1e-12);
-    assert!(
-        called.stdout.contains("2 without an answer"),
-        "{}",
-        called.stdout
-    );
+    insta::assert_snapshot!(called.lines_with("without an answer"), @r#"
+    exit code: 0
+    2 without an answer (none in a file, or no "A:" in the reply of a blind model):
+    "#);
     // Asked and answered: the same command asks neither again.
     let again = house.call(&words(&line));
     assert_eq!(again.code, Some(0), "{again:?}");

@@ -8,6 +8,7 @@ use serde_json::Value;
 
 use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::run::{Bench, assert_same_products, files, records, words};
+use crate::support::snapshot::redacted;
 
 /// The flags of every run here: a folder of twelve small frames with maps and without questions.
 const FLAGS: &str = "--model random --blind-model random --levels L0,L2 --data frames";
@@ -31,11 +32,11 @@ fn json(path: &Path) -> Value {
 }
 
 #[test]
-fn parts_with_a_plan_are_together_what_one_run_without_is() {
+fn planned_shards_equal_one_run() {
     let bench = with_frames();
     bench.complete(&words(&format!("{FLAGS} --out whole")));
     let said = bench.complete(&words(&format!("plan {FLAGS} --out run")));
-    assert!(said.contains("about 12 frames"), "{said}");
+    insta::assert_snapshot!(redacted(&said), @"run/plan: 41 questions about 12 frames, 164 trials");
     let plan = bench.path("run/plan");
     let file = json(&plan.join("plan.json"));
     assert_eq!(file["schema"], "darkqa.plan/1");
@@ -76,7 +77,7 @@ fn parts_with_a_plan_are_together_what_one_run_without_is() {
 
 /// Every file of a frame of other parts is none that could be read.
 #[test]
-fn a_part_opens_only_the_frames_that_it_asks_about() {
+fn shard_opens_only_its_frames() {
     let bench = with_frames();
     let part = |flags: &str| {
         let line = format!("{flags} --data frames --levels L0,L2 --out run --shard 2/4");
@@ -121,7 +122,7 @@ fn a_part_opens_only_the_frames_that_it_asks_about() {
 }
 
 #[test]
-fn a_plan_of_another_run_is_refused_by_the_setting() {
+fn foreign_plan_names_the_setting() {
     let bench = Bench::new();
     let flags = "--model random --levels L0,L2 --data rooms:frames=4,size=120x90";
     bench.complete(&words(&format!("plan {flags} --out run")));
@@ -168,7 +169,7 @@ fn a_plan_of_another_run_is_refused_by_the_setting() {
 }
 
 #[test]
-fn a_frame_that_has_changed_since_the_plan_is_named() {
+fn frame_changed_since_plan_is_named() {
     let bench = with_frames();
     bench.complete(&words(&format!("plan {FLAGS} --out run")));
     let frames = lines(&bench.path("run/plan/frames.jsonl"));
@@ -178,39 +179,34 @@ fn a_frame_that_has_changed_since_the_plan_is_named() {
     bench.complete(&words(&format!("{FLAGS} --out run --shard 1/4")));
     let called = bench.call(&words(&format!("{FLAGS} --out run --shard 4/4")));
     assert_eq!(called.code, Some(2), "{called:?}");
-    let name = frames[11]["frame"].as_str().unwrap();
-    assert!(
-        called.stderr.contains(name) && called.stderr.contains("is not the one that was planned"),
-        "{}",
-        called.stderr
-    );
+    insta::assert_snapshot!(called.messages(), @r#"
+    exit code: 2
+    error: frame "office-0000/robot": its image is not the one that was planned (run/plan); restore it, or write
+        the plan again into another --out
+    "#);
     assert!(!bench.path("run/shard-4-of-4").exists());
     // The plan can be written again only where no part has begun.
     let again = bench.call(&words(&format!("plan {FLAGS} --out run")));
-    assert_eq!(again.code, Some(2), "{again:?}");
-    assert!(
-        again.stderr.contains("parts of another plan"),
-        "{}",
-        again.stderr
-    );
+    insta::assert_snapshot!(again.messages(), @"
+    exit code: 2
+    error: run/plan: the run has parts of another plan, with other questions or frames (run/shard-1-of-4); use
+        another --out, or delete the parts
+    ");
     bench.complete(&words(&format!("plan {FLAGS} --out new")));
     // A file of the plan that was changed is refused.
     let questions = bench.path("new/plan/questions.jsonl");
     let text = fs::read_to_string(&questions).unwrap();
     fs::write(&questions, text.replacen("Which", "What", 1)).unwrap();
     let changed = bench.call(&words(&format!("{FLAGS} --out new")));
-    assert_eq!(changed.code, Some(2), "{changed:?}");
-    assert!(
-        changed
-            .stderr
-            .contains("questions.jsonl: the file is not the one that plan.json"),
-        "{}",
-        changed.stderr
-    );
+    insta::assert_snapshot!(changed.messages(), @"
+    exit code: 2
+    error: new/plan/questions.jsonl: the file is not the one that plan.json was written with; write the plan again
+        with `darkqa-eval plan`
+    ");
 }
 
 #[test]
-fn what_is_missing_is_said_with_the_command_that_asks_it() {
+fn missing_planned_shards_name_command() {
     let bench = with_frames();
     bench.complete(&words(&format!("plan {FLAGS} --out run")));
     for part in ["1/6", "2/6", "3/6", "5/6", "6/6"] {
@@ -220,35 +216,35 @@ fn what_is_missing_is_said_with_the_command_that_asks_it() {
     let refused = merged("");
     assert_eq!(refused.code, Some(2), "{refused:?}");
     let command = format!("darkqa-eval {FLAGS} --out run --shard 4/6");
-    for says in [
-        "1 shard is missing: 4/6 (2 of 12 frames, ",
-        " trials)",
-        &*command,
-    ] {
-        assert!(refused.stderr.contains(says), "{says}: {}", refused.stderr);
-    }
+    insta::assert_snapshot!(refused.messages(), @"
+    exit code: 2
+    error: run/shard-1-of-6: 1 shard is missing: 4/6 (2 of 12 frames, 24 trials); --partial merges the others;
+        darkqa-eval --model random --blind-model random --levels L0,L2 --data frames --out run --shard 4/6 asks
+        what is left
+    ");
     let partial = merged("--partial");
-    assert_eq!(partial.code, Some(1), "{partial:?}");
-    assert!(
-        partial.stderr.contains("4/6 (2 of 12 frames"),
-        "{}",
-        partial.stderr
-    );
+    insta::assert_snapshot!(partial.messages(), @"
+    exit code: 1
+     WARN 1 shard is missing: 4/6 (2 of 12 frames, 24 trials); the summary covers only the others; darkqa-eval
+        --model random --blind-model random --levels L0,L2 --data frames --out run --shard 4/6 asks what is left
+    ");
     // Of two divisions, the one that lacks fewer shards goes on.
     bench.complete(&words(&format!("{FLAGS} --out run --shard 1/2")));
     let mixed = bench.call(&words("merge run --out mixed"));
-    assert!(
-        mixed.stderr.contains("1 shard is missing: "),
-        "{}",
-        mixed.stderr
-    );
+    insta::assert_snapshot!(mixed.messages(), @"
+    exit code: 2
+    error: run/shard-1-of-2: 1 shard is missing: 2/2 (2 of 12 frames, 24 trials); --partial merges the others;
+        darkqa-eval --model random --blind-model random --levels L0,L2 --data frames --out run --shard 2/2 asks
+        what is left
+    ");
     fs::remove_dir_all(bench.path("run/shard-5-of-6")).unwrap();
     let two = bench.call(&words("merge run --out mixed"));
-    assert!(
-        two.stderr.contains("1 shard is missing: 2/2 ("),
-        "{}",
-        two.stderr
-    );
+    insta::assert_snapshot!(two.messages(), @"
+    exit code: 2
+    error: run/shard-1-of-2: 1 shard is missing: 2/2 (5 of 12 frames, 56 trials); --partial merges the others;
+        darkqa-eval --model random --blind-model random --levels L0,L2 --data frames --out run --shard 2/2 asks
+        what is left
+    ");
     // The command said does what it says.
     let words: Vec<&str> = command.split(' ').skip(1).collect();
     bench.complete(&words);
@@ -259,7 +255,7 @@ fn what_is_missing_is_said_with_the_command_that_asks_it() {
 }
 
 #[test]
-fn parts_of_a_plan_cost_about_the_same() {
+fn parts_of_plan_cost_about_same() {
     let bench = Bench::new();
     // Four small frames, and four with sixteen times the pixels.
     let lines = (0..8).map(|i| {
@@ -286,7 +282,7 @@ fn parts_of_a_plan_cost_about_the_same() {
 }
 
 #[test]
-fn a_part_may_cost_its_share_of_the_estimate() {
+fn shard_may_cost_its_share() {
     let bench = Bench::new();
     let mock = MockEndpoint::start([Answer::text("A")]);
     // One question about the first frame, and nine about the second.

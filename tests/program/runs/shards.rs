@@ -6,6 +6,7 @@ use std::fs;
 use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::process::{signal, wait_until};
 use crate::support::run::{Bench, assert_same_products, called, model_args, records, words};
+use crate::support::snapshot::redacted;
 use serde_json::Value;
 
 /// The arguments of every evaluation here, and more of them.
@@ -27,7 +28,7 @@ fn timeless(run: &std::path::Path) -> BTreeMap<String, Value> {
 }
 
 #[test]
-fn parts_are_together_what_one_run_is() {
+fn shards_equal_one_run() {
     let bench = Bench::new();
     bench.complete(&args("--out whole"));
     for part in ["1/4", "2/4", "3/4", "4/4"] {
@@ -62,7 +63,7 @@ fn parts_are_together_what_one_run_is() {
 }
 
 #[test]
-fn a_batch_system_says_which_part_it_is() {
+fn batch_system_names_the_shard() {
     let bench = Bench::new();
     let task = |variables: &[(&str, &str)], more: &str| {
         let mut command = bench.command(&args(more));
@@ -75,29 +76,28 @@ fn a_batch_system_says_which_part_it_is() {
         ("SLURM_ARRAY_TASK_COUNT", "2"),
     ];
     let array = task(&slurm, "--out array");
-    assert_eq!(array.code, Some(0), "{array:?}");
-    assert!(
-        array
-            .stderr
-            .contains("task 2 of a Slurm array of 2: this process does shard 2/2"),
-        "{}",
-        array.stderr
-    );
+    insta::assert_snapshot!(array.messages(), @"
+    exit code: 0
+     WARN task 2 of a Slurm array of 2: this process does shard 2/2; --shard none does everything
+    ");
     assert!(bench.path("array/shard-2-of-2/manifest.json").exists());
     let whole = task(&slurm, "--out all --shard none");
     assert_eq!(whole.code, Some(0), "{whole:?}");
     assert!(bench.path("all/manifest.json").exists());
     let pod = [("JOB_COMPLETION_INDEX", "1")];
     let lost = task(&pod, "--out pod");
-    assert_eq!(lost.code, Some(2));
-    assert!(lost.stderr.contains("--shard auto/N"), "{}", lost.stderr);
+    insta::assert_snapshot!(lost.messages(), @"
+    exit code: 2
+    error: --shard: JOB_COMPLETION_INDEX is the index of this pod, but the number of pods is unknown: set it with
+        --shard auto/N, or do everything in each pod with --shard none
+    ");
     let found = task(&pod, "--out pod --shard auto/3");
     assert_eq!(found.code, Some(0), "{found:?}");
     assert!(bench.path("pod/shard-2-of-3/manifest.json").exists());
 }
 
 #[test]
-fn missing_double_and_foreign_parts_are_named() {
+fn missing_and_foreign_shards_are_named() {
     let bench = Bench::new();
     bench.complete(&args("--out parts --shard 1/3"));
     bench.complete(&args("--out parts --shard 3/3"));
@@ -113,12 +113,10 @@ fn missing_double_and_foreign_parts_are_named() {
     refused("parts --out m", "1 shard is missing: 2/3; --partial");
     assert!(!bench.path("m").exists());
     let partial = bench.call(&["merge", "parts", "--out", "m", "--partial"]);
-    assert_eq!(partial.code, Some(1), "{partial:?}");
-    assert!(
-        partial.stdout.contains("! m: incomplete:"),
-        "{}",
-        partial.stdout
-    );
+    insta::assert_snapshot!(partial.lines_with("incomplete"), @"
+    exit code: 1
+    ! m: incomplete: 48 of 48 trials answered, 0 failed.
+    ");
     bench.complete(&args("--out other --shard 2/3 --seed 9"));
     refused("parts other --out n", "is of another run than");
     bench.complete(&args("--out four --shard 2/4"));
@@ -130,11 +128,10 @@ fn missing_double_and_foreign_parts_are_named() {
     refused("whole --out n", "the run is not a shard");
     refused("nowhere --out n", "nowhere");
     let empty = bench.call(&args("--out x --shard 7/7"));
-    assert!(
-        empty.stderr.contains("7/7 is empty: there are 6 frames"),
-        "{}",
-        empty.stderr
-    );
+    insta::assert_snapshot!(empty.messages(), @"
+    exit code: 2
+    error: --shard: 7/7 is empty: there are 6 frames or walks; use at most as many shards
+    ");
 }
 
 /// A mock that gives the same reply to the same request, and the arguments of an evaluation with it.
@@ -143,7 +140,7 @@ fn asked_of(mock: &MockEndpoint) -> String {
 }
 
 #[test]
-fn a_stopped_division_goes_on_with_another_number_of_parts() {
+fn stopped_shards_resume_in_other_number() {
     let bench = Bench::new();
     let mock = MockEndpoint::start([Answer::text("B")]);
     let flags = asked_of(&mock);
@@ -158,12 +155,11 @@ fn a_stopped_division_goes_on_with_another_number_of_parts() {
     let locked = fs::File::open(own).unwrap();
     locked.lock().unwrap();
     let refused = bench.call(&words(&format!("{flags} --out parts --shard 1/2")));
-    assert_eq!(refused.code, Some(2), "{refused:?}");
-    assert!(
-        refused.stderr.contains("shard-1-of-3") && refused.stderr.contains("another division"),
-        "{}",
-        refused.stderr
-    );
+    insta::assert_snapshot!(refused.messages(), @"
+    exit code: 2
+    error: parts/shard-1-of-3: another process is writing to this part of another division, and both might ask the
+        same; wait for it, or end it, before --shard 1/2 begins
+    ");
     drop(locked);
     for part in ["1/2", "2/2"] {
         let said = bench.call(&words(&format!("{flags} --out parts --shard {part}")));
@@ -179,16 +175,15 @@ fn a_stopped_division_goes_on_with_another_number_of_parts() {
     assert_same_products(&bench.path("whole"), &bench.path("merged"));
     // A part of another run beside them is refused.
     let other = bench.call(&words(&format!("{flags} --seed 7 --out parts --shard 1/4")));
-    assert_eq!(other.code, Some(2), "{other:?}");
-    assert!(
-        other.stderr.contains("this part is of another run"),
-        "{}",
-        other.stderr
-    );
+    insta::assert_snapshot!(other.messages(), @"
+    exit code: 2
+    error: parts/shard-1-of-3: this part is of another run: its --seed is 0, now it is 7; use another --out, or
+        the same --seed
+    ");
 }
 
 #[test]
-fn replies_that_two_parts_paid_for_are_said() {
+fn doubly_paid_replies_are_reported() {
     let bench = Bench::new();
     let mock = MockEndpoint::start([Answer::text("A"), Answer::text("B")]);
     let flags = asked_of(&mock);
@@ -198,6 +193,7 @@ fn replies_that_two_parts_paid_for_are_said() {
     bench.complete(&words(&format!("{flags} --out one --shard 2/2")));
     let merged = bench.call(&words("merge one two --out merged"));
     assert_eq!(merged.code, Some(0), "{merged:?}");
+    // How many depends on the order of the replies.
     let said = "replies differ in two parts: they were paid for twice";
     assert!(merged.stderr.contains(said), "{}", merged.stderr);
     let first = bench.call(&words("merge one --out first"));
@@ -206,7 +202,7 @@ fn replies_that_two_parts_paid_for_are_said() {
 }
 
 #[test]
-fn limits_and_means_are_shared_by_the_parts() {
+fn shards_share_limits_and_resources() {
     let bench = Bench::with_questions(6);
     let mock = MockEndpoint::start([Answer::text("B")]);
     let base = mock.base_url();
@@ -232,10 +228,7 @@ fn limits_and_means_are_shared_by_the_parts() {
     )));
     assert_eq!(of_part.code, Some(0), "{of_part:?}");
     let words_of = of_part.stderr.split("shard 1/2: ").nth(1).unwrap();
-    assert!(
-        words_of.contains("of its $4.00 of --max-cost are left"),
-        "{words_of}"
-    );
+    insta::assert_snapshot!(redacted(words_of), @"$4.00 of its $4.00 of --max-cost are left; other parts do not get them");
     let text = fs::read(bench.path("paid/shard-1-of-2/manifest.json")).unwrap();
     let manifest: Value = serde_json::from_slice(&text).unwrap();
     let noted = &manifest["settings"]["--max-cost of this part"];
@@ -258,7 +251,7 @@ fn limits_and_means_are_shared_by_the_parts() {
 /// The script as a node runs it, with a `scontrol` that writes down what it is told.
 #[cfg(unix)]
 #[test]
-fn the_script_of_slurm_has_a_stopped_task_started_again() {
+fn slurm_script_restarts_stopped_task() {
     use std::os::unix::fs::PermissionsExt as _;
     use std::time::Duration;
 

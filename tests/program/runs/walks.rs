@@ -10,6 +10,7 @@ use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::house::{House, flags};
 use crate::support::process::{signal, wait_until};
 use crate::support::run::{Called, assert_same_products, files, records, words};
+use crate::support::snapshot::lines_with;
 use serde_json::{Value, json};
 
 /// A script that answers each question in its own words, and one that marks the answers.
@@ -39,7 +40,7 @@ fn complete(house: &House, more: &str) -> String {
 }
 
 #[test]
-fn parts_are_together_what_one_run_is() {
+fn walk_shards_equal_one_run() {
     let house = House::new();
     scripts(&house);
     complete(&house, "--out whole");
@@ -67,16 +68,15 @@ fn parts_are_together_what_one_run_is() {
         "--data rooms:frames=2,size=64x48 --model random --levels L0 --shard 1/2 --out parts",
     ));
     let refused = house.0.call(&["merge", "parts", "--out", "mixed"]);
-    assert_eq!(refused.code, Some(2), "{refused:?}");
-    assert!(
-        refused.stderr.contains("cannot be merged"),
-        "{}",
-        refused.stderr
-    );
+    insta::assert_snapshot!(refused.messages(), @"
+    exit code: 2
+    error: parts/shard-2-of-2: runs of questions with choices and of open questions cannot be merged:
+        parts/shard-1-of-2 is of the other kind
+    ");
 }
 
 #[test]
-fn a_report_is_made_from_the_folder_alone() {
+fn report_is_made_from_folder_alone() {
     let house = House::new();
     scripts(&house);
     let table = complete(&house, "--out run");
@@ -90,7 +90,7 @@ fn a_report_is_made_from_the_folder_alone() {
 }
 
 #[test]
-fn several_runs_are_compared_if_one_judge_marked_them() {
+fn comparison_needs_one_judge() {
     let house = House::new();
     scripts(&house);
     complete(&house, "--out one");
@@ -114,9 +114,14 @@ fn several_runs_are_compared_if_one_judge_marked_them() {
     let table = house
         .0
         .complete(&["report", "one", "two", "--out", "compared"]);
-    for model in ["script:a.jsonl", "script:b.jsonl"] {
-        assert!(table.contains(model), "{table}");
-    }
+    insta::assert_snapshot!(lines_with(&table, "script:"), @"
+    Score in % (LLM-Match, marked by script:j.jsonl, protocol upstream): mean (difference from L0), and how far
+        the widest 95 % interval over 2 episodes reaches down and up
+     script:a.jsonl   with noise   41.7   41.7 (0.0)   6 of 6   −22.3 +26.4
+     script:b.jsonl   with noise   41.7   41.7 (0.0)   6 of 6   −22.3 +26.4
+     script:a.jsonl   with noise   hm3d-v0                 50.0   50.0 (0.0)   −41.8 +41.8
+     script:b.jsonl   with noise   hm3d-v0                 50.0   50.0 (0.0)   −41.8 +41.8
+    ");
     let summary = fs::read_to_string(house.0.path("compared/summary.csv")).unwrap();
     let of_all = summary.lines().filter(|line| line.contains(",all,all,"));
     assert_eq!(of_all.count(), 4, "{summary}");
@@ -124,18 +129,21 @@ fn several_runs_are_compared_if_one_judge_marked_them() {
     house.0.file("a.jsonl", "{\"default\": \"nothing\"}");
     complete(&house, "--out three");
     let table = house.0.complete(&["report", "one", "three"]);
-    assert!(table.contains("script:a.jsonl (three)"), "{table}");
+    insta::assert_snapshot!(lines_with(&table, "(three)"), @"
+    ! script:a.jsonl stands apart as script:a.jsonl (one) and script:a.jsonl (three): its file is d2db69ca… in one
+        and 020b644a… in three; 6 of 6 replies to the same trials differ.
+     script:a.jsonl (three)   with noise   41.7   41.7 (0.0)   6 of 6   −22.3 +26.4
+     script:a.jsonl (three)   with noise   hm3d-v0                 50.0   50.0 (0.0)   −41.8 +41.8
+    ");
     fs::copy(house.0.path("j.jsonl"), house.0.path("k.jsonl")).unwrap();
     run_other("script:k.jsonl", "four");
     let refused = house.0.call(&["report", "one", "four"]);
-    assert_eq!(refused.code, Some(2), "{refused:?}");
-    assert!(
-        refused
-            .stderr
-            .contains("marks of two judges or protocols cannot be compared"),
-        "{}",
-        refused.stderr
-    );
+    insta::assert_snapshot!(refused.messages(), @"
+    exit code: 2
+    error: four: its answers were marked by script:k.jsonl (upstream) and those of one by script:j.jsonl
+        (upstream): marks of two judges or protocols cannot be compared; report each run alone, or run openeqa on
+        its folder again with the other's --judge and --protocol: only marks are asked
+    ");
 }
 
 /// An endpoint whose model answers `brown`, and marks with 2 at temperature 0.2 and with 4 else.
@@ -151,7 +159,7 @@ fn answering_and_marking() -> MockEndpoint {
 }
 
 #[test]
-fn a_model_that_marks_itself_has_its_marks_also_beside_another_run() {
+fn self_marking_model_keeps_its_marks() {
     let house = House::new();
     let mock = answering_and_marking();
     let base = mock.base_url();
@@ -182,7 +190,7 @@ fn a_model_that_marks_itself_has_its_marks_also_beside_another_run() {
 }
 
 #[test]
-fn two_judges_of_one_name_are_two_judges() {
+fn judges_of_one_name_differ() {
     let house = House::new();
     let mock = answering_and_marking();
     let base = mock.base_url();
@@ -193,25 +201,22 @@ fn two_judges_of_one_name_are_two_judges() {
         assert_eq!(called.code, Some(0), "{called:?}");
     }
     let refused = house.0.call(&["report", "one", "two"]);
-    assert_eq!(refused.code, Some(2), "{refused:?}");
-    assert!(
-        refused
-            .stderr
-            .contains("--judge-temperature is 0.2 in one and 1 in two"),
-        "{}",
-        refused.stderr
-    );
+    insta::assert_snapshot!(refused.messages(), @"
+    exit code: 2
+    error: one: the judges of the runs have one name and differ: --judge-temperature is 0.2 in one and 1 in two;
+        marks of two judges cannot be compared: report each run alone
+    ");
     // And in one run.
     let again = house.call(&words(&format!(
         "--model m --judge j --base-url {base} --judge-temperature 1 --levels L0 --out one"
     )));
-    assert_eq!(again.code, Some(2), "{again:?}");
-    assert!(
-        again
-            .stderr
-            .contains("the judge j has another --judge-temperature"),
-        "{again:?}"
-    );
+    insta::assert_snapshot!(again.messages(), @r#"
+    exit code: 2
+     WARN 1 of 2 walks has fewer frames than --num-frames 3: they are shown several times in a request, as
+        upstream does (the 2 frames of scannet-v0/001-b, for example)
+    error: one: the judge j has another --judge-temperature in this run: it was "0.2", now it is "1"; use another
+        --out, or the same --judge-temperature
+    "#);
 
     scripts(&house);
     complete(&house, "--out three");
@@ -222,7 +227,7 @@ fn two_judges_of_one_name_are_two_judges() {
 }
 
 #[test]
-fn the_images_of_a_walk_are_made_again_and_proved() {
+fn walk_images_are_rebuilt_and_verified() {
     let house = House::new();
     scripts(&house);
     complete(&house, "--out run");
@@ -246,22 +251,24 @@ fn the_images_of_a_walk_are_made_again_and_proved() {
     });
     fs::copy(other, one).unwrap();
     let called = house.0.call(&["show", "run", "q1"]);
-    assert_eq!(called.code, Some(1), "{called:?}");
-    assert!(called.stdout.contains("NOT the bytes that were sent"));
+    insta::assert_snapshot!(called.lines_with("bytes"), @"
+    exit code: 1
+    L0: NOT the bytes that were sent: [DIGEST] now
+    L3-noise: NOT the bytes that were sent: [DIGEST] now
+    ");
     // And the run goes on with it no more.
     let refused = run(&house, "--out run");
-    assert_eq!(refused.code, Some(2), "{refused:?}");
-    assert!(
-        refused
-            .stderr
-            .contains("has changed since the run began; so has 1 more question; restore the file"),
-        "{}",
-        refused.stderr
-    );
+    insta::assert_snapshot!(refused.messages(), @r#"
+    exit code: 2
+     WARN 1 of 2 walks has fewer frames than --num-frames 3: they are shown several times in a request, as
+        upstream does (the 2 frames of scannet-v0/001-b, for example)
+    error: run: the image "hm3d-v0/000-a" of question "q1" has changed since the run began; so has 1 more
+        question; restore the file or its --data, or use another --out
+    "#);
 }
 
 #[test]
-fn time_is_said_of_walks_too() {
+fn walks_report_their_timings() {
     let house = House::new();
     scripts(&house);
     let called = run(&house, "--out run --timings");
@@ -273,7 +280,7 @@ fn time_is_said_of_walks_too() {
 }
 
 #[test]
-fn a_killed_run_goes_on_and_asks_nothing_twice() {
+fn killed_run_repeats_nothing() {
     let house = House::new();
     let mock = MockEndpoint::answering(|request| {
         std::thread::sleep(Duration::from_millis(60));

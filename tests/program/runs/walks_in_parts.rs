@@ -60,7 +60,7 @@ fn flags(mock: &MockEndpoint, more: &str) -> String {
     )
 }
 
-/// What is asked, by key.
+/// Trials by key.
 fn asked(run: &std::path::Path) -> BTreeMap<String, Value> {
     records(run)
         .into_iter()
@@ -69,7 +69,7 @@ fn asked(run: &std::path::Path) -> BTreeMap<String, Value> {
 }
 
 #[test]
-fn seven_parts_of_which_one_is_killed_go_on_in_other_numbers() {
+fn killed_shard_resumes_in_other_numbers() {
     let bench = with_walks();
     let mock = endpoint();
     bench.complete(&words(&flags(&mock, "--out whole")));
@@ -112,7 +112,7 @@ fn seven_parts_of_which_one_is_killed_go_on_in_other_numbers() {
 }
 
 #[test]
-fn a_model_is_added_to_the_parts_of_a_run() {
+fn model_is_added_to_shards() {
     let bench = Bench::new();
     let mock = MockEndpoint::start([Answer::text("B")]);
     let flags = |models: &str, more: &str| {

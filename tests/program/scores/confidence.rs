@@ -87,7 +87,7 @@ fn of(records: &[Record], draws: &Resamples) -> Calibration {
     found.remove(0)
 }
 
-/// Calibrations of so many simulated runs.
+/// Calibrations of `runs` simulated runs.
 fn simulated(
     seed: u64,
     runs: usize,
@@ -117,7 +117,7 @@ fn mean(found: &[Calibration], of: fn(&Calibration) -> f64) -> f64 {
 
 /// The error that is still found where there is none, by number of replies. Without the correction it would be 0.10 and 0.087.
 #[test]
-fn a_perfect_model_has_next_to_no_calibration_error() {
+fn perfect_model_is_calibrated() {
     for (frames, size, most) in [(25, 4, 0.045), (100, 4, 0.028)] {
         let found = simulated(3, 100, (frames, size), calibrated);
         let error = mean(&found, |row| row.error.unwrap().value);
@@ -147,7 +147,7 @@ fn truth_of(number: impl Fn(f64) -> f64) -> f64 {
 }
 
 #[test]
-fn intervals_hold_the_truth_of_an_overconfident_model() {
+fn intervals_hold_truth_of_overconfident_model() {
     let error = truth_of(|c| (c - overconfident(c)).powi(2)).sqrt();
     let gap = truth_of(|c| c - overconfident(c));
     let brier = truth_of(|c| {
@@ -204,7 +204,7 @@ fn confidence_that_is_noise_tells_nothing() {
 }
 
 #[test]
-fn replies_with_reasoning_or_without_probabilities_are_counted_apart() {
+fn reasoning_replies_are_counted_apart() {
     let mut random = StdRng::seed_from_u64(7);
     let mut records = replies(&mut random, 30, 4, calibrated);
     for record in &mut records[..7] {

@@ -4,6 +4,7 @@ use std::fs;
 
 use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::run::{Bench, model_args, records, words};
+use crate::support::snapshot::{lines_with, redacted};
 use serde_json::{Value, json};
 
 /// The arguments of every run, and more of them.
@@ -17,7 +18,7 @@ fn run(bench: &Bench, more: &str) -> String {
 }
 
 #[test]
-fn every_rotation_is_asked_and_an_answer_by_position_averages_out() {
+fn rotation_averages_position_bias() {
     let bench = Bench::with_questions(6);
     bench.file("script.jsonl", "{\"default\":\"A\"}");
     let table = run(&bench, "--model script:script.jsonl --circular");
@@ -51,11 +52,22 @@ fn every_rotation_is_asked_and_an_answer_by_position_averages_out() {
     let text = "{\"default\":\"brown\"}";
     bench.file("script.jsonl", text);
     let by_text = args("--out by-text --model script:script.jsonl --circular");
-    assert!(bench.complete(&by_text).contains("100.0"));
+    insta::assert_snapshot!(redacted(&bench.complete(&by_text)), @"
+    script:script.jsonl · 6 questions · 1 frame · 18 replies, 0 failed · intervals by question
+    ! Only 6 questions (8 are needed): intervals and tests are rough.
+
+     accuracy in %
+     script:script.jsonl    L0   95 %
+     untouched           100.0   −33.9 0.0
+     95 %: how far the widest interval of the row reaches down and up
+     chance 33.3
+    run: by-text
+    report: by-text/report.html
+    ");
 }
 
 #[test]
-fn chance_is_that_of_what_is_asked() {
+fn chance_follows_asked_questions() {
     let bench = Bench::with_questions(1);
     let question = |id: &str, choices: &[&str]| {
         let question = json!({
@@ -70,15 +82,18 @@ fn chance_is_that_of_what_is_asked() {
     bench.file("script.jsonl", "{\"default\":\"A\"}");
     // Two replies with a half and four with a quarter each: two of six, as for the one who always says A.
     let table = run(&bench, "--model script:script.jsonl --circular");
-    assert!(table.contains("33.3"), "{table}");
-    assert!(
-        table.contains("chance: 33.33 over 6 orders of choices"),
-        "{table}"
-    );
+    insta::assert_snapshot!(lines_with(&table, "33.3"), @"
+     script:script.jsonl   untouched            33.3   6          0        0   −23.7 +36.7
+    chance: 33.33 over 6 orders of choices
+    ");
+    insta::assert_snapshot!(lines_with(&table, "chance"), @"
+    chance: 33.33 over 6 orders of choices
+    chance with each question once, as the paper counts: 37.50 over 2 questions
+    ");
 }
 
 #[test]
-fn shuffled_orders_are_the_same_in_every_condition_and_run() {
+fn shuffled_orders_are_stable() {
     let orders = |seed: &str| {
         let bench = Bench::with_questions(6);
         bench.complete(&words(&format!(
@@ -123,7 +138,7 @@ fn repeats_are_trials_of_their_own() {
 }
 
 #[test]
-fn a_constraint_is_sent_and_its_object_is_read() {
+fn constraint_is_sent_and_parsed() {
     let bench = Bench::with_questions(6);
     let mock = MockEndpoint::start([Answer::text("{\"answer\": \"C\"}")]);
     let base = mock.base_url();
@@ -145,7 +160,11 @@ fn a_constraint_is_sent_and_its_object_is_read() {
     assert!(!of("run").contains("Constraint not followed"));
     // It measures something else, so it is another run.
     let other = [args("--out run"), words(&model)].concat();
-    assert!(bench.call(&other).stderr.contains("--request constrain"));
+    insta::assert_snapshot!(bench.call(&other).messages(), @r#"
+    exit code: 2
+    error: run: the model m has another --request constrain in this run: it was "json", now it is "none"; use
+        another --out, or the same --request constrain
+    "#);
 
     let mock = MockEndpoint::start([Answer::text("I think C")]);
     let base = mock.base_url();
@@ -155,10 +174,11 @@ fn a_constraint_is_sent_and_its_object_is_read() {
         mock.requests()[0].json()["structured_outputs"]["choice"],
         json!(["A", "B", "C"])
     );
-    assert!(
-        called.stderr.contains("--request constrain=choice"),
-        "said once: {called:?}"
-    );
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 0
+     WARN m: a reply does not have the form that --request constrain=choice requests; the server may not support
+        it, or the reply was truncated (--max-tokens)
+    ");
     assert_eq!(
         called.stderr.matches("--request constrain=choice").count(),
         1
@@ -171,7 +191,7 @@ fn a_constraint_is_sent_and_its_object_is_read() {
 }
 
 #[test]
-fn kept_replies_are_read_again_without_a_call() {
+fn stored_replies_are_reparsed_offline() {
     let bench = Bench::with_questions(6);
     bench.file("script.jsonl", "{\"default\":\"C\"}");
     let table = run(&bench, "--model script:script.jsonl");
@@ -210,7 +230,7 @@ fn kept_replies_are_read_again_without_a_call() {
 }
 
 #[test]
-fn a_run_that_an_earlier_version_read_says_what_has_changed() {
+fn earlier_parsing_is_reported() {
     let bench = Bench::with_questions(6);
     bench.file("script.jsonl", "{\"default\":\"I can rule out option C.\"}");
     run(&bench, "--model script:script.jsonl");
@@ -259,7 +279,7 @@ fn a_run_that_an_earlier_version_read_says_what_has_changed() {
 }
 
 #[test]
-fn replies_without_an_answer_are_told_by_reason() {
+fn unanswered_replies_show_their_reason() {
     let bench = Bench::with_questions(6);
     let thinking = json!({"content": null, "reasoning_content": "hmm"});
     let mut answers = vec![Answer::message(&thinking, "length"); 10];
@@ -272,14 +292,15 @@ fn replies_without_an_answer_are_told_by_reason() {
     let base = mock.base_url();
     let repeated = args("--out run --full --repeats 2 --concurrency 1");
     let called = bench.call(&[repeated, model_args(&base, "")].concat());
-    assert!(
-        called.stdout.contains(
-            "10 cut at the token limit (--max-tokens), 1 refused, 1 withheld by a filter"
-        ),
-        "{called:?}"
-    );
-    assert!(
-        called.stderr.contains("10 of the first 10 replies"),
-        "{called:?}"
-    );
+    insta::assert_snapshot!(called.lines_with("token limit"), @"
+    exit code: 0
+    of the unparsed replies 10 cut at the token limit (--max-tokens), 1 refused, 1 withheld by a filter
+    WARN 10 of the first 10 replies were cut at the token limit before any text: a reasoning model needs a larger
+        --max-tokens, or a lower --reasoning-effort
+    ");
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 0
+     WARN 10 of the first 10 replies were cut at the token limit before any text: a reasoning model needs a larger
+        --max-tokens, or a lower --reasoning-effort
+    ");
 }

@@ -69,7 +69,7 @@ fn rejected(seed: u64, times: usize, sizes: [usize; 2], slope: f64) -> f64 {
 }
 
 #[test]
-fn fidelity_that_says_nothing_is_rarely_called_a_predictor() {
+fn useless_fidelity_is_rarely_predictive() {
     for sizes in [[12, 8], [25, 8], [52, 20]] {
         let rate = rejected(1, 400, sizes, 0.0);
         assert!((1.5..=8.0).contains(&rate), "{sizes:?}: {rate} %");
@@ -79,7 +79,7 @@ fn fidelity_that_says_nothing_is_rarely_called_a_predictor() {
 }
 
 #[test]
-fn two_frames_with_the_same_dark_image_have_their_own_fidelity() {
+fn equal_dark_images_keep_own_fidelity() {
     let condition: Condition = "L5-ev".parse().unwrap();
     let black = Digest::from_bytes(b"black");
     let (mut records, mut measured) = (Vec::new(), Vec::new());
@@ -105,7 +105,7 @@ fn two_frames_with_the_same_dark_image_have_their_own_fidelity() {
 }
 
 #[test]
-fn a_run_keeps_the_fidelity_of_its_images_and_reports_it() {
+fn run_reports_image_fidelity() {
     let bench = Bench::new();
     bench.rooms("frames", 8, "160x120");
     let run = |variant: &str| {

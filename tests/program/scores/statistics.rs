@@ -73,7 +73,7 @@ fn clusters_of(records: &[Record]) -> Clusters {
     Clusters::new(asked, &FrameTies::default())
 }
 
-/// So many questions about each of so many frames.
+/// Number of questions about each frame.
 fn sizes(random: &mut StdRng, frames: usize, least: usize, most: usize) -> Vec<usize> {
     (0..frames)
         .map(|_| random.random_range(least..=most))
@@ -174,7 +174,7 @@ fn walks(
 }
 
 #[test]
-fn intervals_of_open_scores_hold_the_truth() {
+fn intervals_of_open_scores_hold_truth() {
     // Give or take 2.2 %.
     const RUNS: usize = 400;
     let mut random = StdRng::seed_from_u64(11);
@@ -286,7 +286,7 @@ fn intervals_of_differences_hold_the_truth() {
 }
 
 #[test]
-fn tests_keep_their_size_and_find_what_is_there() {
+fn tests_keep_size_and_power() {
     let mut random = StdRng::seed_from_u64(10);
     let mut rejected = |first: f64, second: f64, correlation: f64| {
         let (mut swapped, mut plain) = (0, 0);
@@ -389,7 +389,7 @@ fn thresholds_are_recovered() {
 }
 
 #[test]
-fn a_made_set_gives_the_papers_arithmetic() {
+fn made_set_gives_papers_arithmetic() {
     // Presence: of 4 truths "no" one is answered "yes"; of 5 truths "yes" three are answered "no", one cannot be read.
     // Colour: of 8 replies 6 are "black", of which 2 are true.
     let mut records = Vec::new();

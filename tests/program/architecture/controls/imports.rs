@@ -78,7 +78,7 @@ fn imports_of_no_room_are_found() {
 }
 
 #[test]
-fn imports_that_the_map_allows_are_not_found() {
+fn allowed_imports_are_not_reported() {
     check(
         |files| rules::imports(files, &map(), &[]),
         &[],

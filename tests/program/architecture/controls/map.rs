@@ -34,7 +34,7 @@ fn the_map_must_be_true() {
 }
 
 #[test]
-fn a_map_that_cannot_be_read_is_an_error() {
+fn unreadable_map_is_an_error() {
     let rows = [
         "| run | nothing |",
         "| `run` | everything |",

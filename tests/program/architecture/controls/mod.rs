@@ -54,7 +54,7 @@ fn check(rule: impl Fn(&Files) -> Vec<String>, expected: &[&str], small: &[&str]
 }
 
 #[test]
-fn a_folder_is_read_with_the_folders_in_it() {
+fn folder_is_read_recursively() {
     let folder = tempfile::tempdir().unwrap();
     fs::create_dir_all(folder.path().join("ask/wire")).unwrap();
     let texts = [
@@ -77,6 +77,6 @@ fn a_folder_is_read_with_the_folders_in_it() {
 }
 
 #[test]
-fn text_that_is_no_rust_is_an_error() {
+fn text_other_than_rust_fails() {
     assert!(Source::read("ask/mod.rs", "fn f( {").is_err());
 }

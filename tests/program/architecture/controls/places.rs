@@ -5,7 +5,7 @@ use crate::architecture::files::Files;
 use crate::architecture::{digests, rules};
 
 #[test]
-fn missing_code_and_long_files_are_found() {
+fn missing_code_and_long_files_reported() {
     check(
         rules::unfinished,
         &["src/error.rs:1: `todo!` stands for code that is missing"],
@@ -34,7 +34,7 @@ fn missing_code_and_long_files_are_found() {
 }
 
 #[test]
-fn awaits_outside_of_their_places_are_found() {
+fn misplaced_awaits_are_reported() {
     let rule = |files: &Files| rules::awaits(files, &["ask"]);
     let unused = "`.await` may stand in ask, but does not: delete this place";
     check(
@@ -63,7 +63,7 @@ fn awaits_outside_of_their_places_are_found() {
 }
 
 #[test]
-fn libraries_outside_of_their_places_are_found() {
+fn misplaced_libraries_are_reported() {
     let rule = |files: &Files| rules::library(files, "image", &["enhance"]);
     let outside = "src/types/a.rs:1: `image` may stand only in enhance";
     let unused = "`image` may stand in enhance, but does not: delete this place";

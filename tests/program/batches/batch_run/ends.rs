@@ -22,7 +22,7 @@ fn output_comes_in_any_shape() {
 
 /// A key that a server repeats in its files is in no file of the run.
 #[test]
-fn a_key_in_the_output_of_a_batch_is_kept_nowhere() {
+fn batch_output_key_is_never_stored() {
     const KEY: &str = "sk-0123456789abcdef";
     let course = Course::of("completed")
         .text("C, and the key is sk-0123456789abcdef")
@@ -56,7 +56,7 @@ fn a_key_in_the_output_of_a_batch_is_kept_nowhere() {
 }
 
 #[test]
-fn what_failed_for_reasons_of_the_server_is_asked_again() {
+fn server_faults_are_asked_again() {
     let lines: [fn(usize) -> Line; 5] = [
         |i| [Line::Right, Line::Status(429, "slow down")][i % 2],
         |i| [Line::Status(500, "oops"), Line::Right][i % 2],
@@ -78,7 +78,7 @@ fn what_failed_for_reasons_of_the_server_is_asked_again() {
 }
 
 #[test]
-fn what_was_refused_is_not_asked_again_by_the_same_command() {
+fn refused_requests_are_not_repeated() {
     let course =
         Course::of("completed").lines(|i| [Line::Right, Line::Status(400, "bad image")][i % 2]);
     let (bench, mock, called) = blind(&[course, Course::of("completed")], "");
@@ -94,7 +94,7 @@ fn what_was_refused_is_not_asked_again_by_the_same_command() {
 }
 
 #[test]
-fn what_expires_is_asked_again_three_times_at_most() {
+fn expired_requests_retry_three_times() {
     let (bench, mock, called) = blind(
         &[Course::of("in_progress expired").lines(|_| Line::Expired)],
         "",
@@ -111,7 +111,7 @@ fn what_expires_is_asked_again_three_times_at_most() {
 }
 
 #[test]
-fn a_batch_that_is_cancelled_elsewhere_is_asked_again() {
+fn batch_cancelled_elsewhere_is_repeated() {
     let states = ["cancelling"; 10].join(" ") + " cancelled";
     let course = Course::of(&states).lines(|i| if i < 2 { Line::Right } else { Line::Absent });
     let (bench, mock, called) = blind(&[course, Course::of("completed")], "");
@@ -121,14 +121,14 @@ fn a_batch_that_is_cancelled_elsewhere_is_asked_again() {
 }
 
 #[test]
-fn a_batch_that_the_server_cannot_begin_stops_the_run() {
+fn rejected_batch_stops_the_run() {
     let failing = Course::failing("invalid_json_line", "this line is no JSON", &json!(3));
     let (bench, mock, called) = blind(&[failing, Course::of("completed")], "");
-    assert_eq!(called.code, Some(2), "{called:?}");
-    assert!(
-        called.stderr.contains("line 3: this line is no JSON"),
-        "{called:?}"
-    );
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 2
+    error: http://127.0.0.1:[PORT]/v1: part-1-m-001.jsonl: the batch batch_1 failed: line 3: this line is no JSON
+        (invalid_json_line); none of its requests has a reply
+    ");
     // Its requests are free: the same command asks them.
     let called = call_with(BLIND, &bench, &mock, "");
     assert_eq!(called.code, Some(0), "{called:?}");
@@ -136,7 +136,7 @@ fn a_batch_that_the_server_cannot_begin_stops_the_run() {
 }
 
 #[test]
-fn failures_to_look_or_to_fetch_are_no_failures_of_the_batch() {
+fn polling_failures_do_not_fail_batch() {
     let bench = Bench::with_questions(QUESTIONS);
     let mock = MockBatches::start([Course::of("dreaming in_progress completed")]);
     let bad = |status| Fault::Instead(Answer::error(status, "oops", "oops"));
@@ -159,7 +159,7 @@ fn failures_to_look_or_to_fetch_are_no_failures_of_the_batch() {
 }
 
 #[test]
-fn a_refusal_stops_the_run_and_the_same_command_goes_on() {
+fn refusal_stops_run_until_resumed() {
     let rows = [
         (
             "POST files",
@@ -189,7 +189,7 @@ fn a_refusal_stops_the_run_and_the_same_command_goes_on() {
 
 /// A gateway without storage for files answers each upload so.
 #[test]
-fn a_server_that_fails_at_every_upload_or_batch_ends_the_run() {
+fn persistent_upload_failures_end_run() {
     for kind in ["POST files", "POST batches"] {
         let bench = Bench::with_questions(QUESTIONS);
         let mock = MockBatches::start([Course::of("completed")]);
@@ -210,7 +210,7 @@ fn a_server_that_fails_at_every_upload_or_batch_ends_the_run() {
 }
 
 #[test]
-fn a_batch_that_never_ends_is_cancelled_if_asked_for() {
+fn endless_batch_is_cancelled_on_request() {
     let course = Course::of(&"in_progress ".repeat(1000)).lines(|_| Line::Absent);
     let (bench, mock, called) = blind(&[course, Course::of("completed")], "--give-up 0.0003");
     assert_eq!(called.code, Some(0), "{called:?}");
@@ -222,7 +222,7 @@ fn a_batch_that_never_ends_is_cancelled_if_asked_for() {
 }
 
 #[test]
-fn a_file_that_was_edited_is_not_uploaded() {
+fn edited_file_is_not_uploaded() {
     let (bench, mock, called) = blind(
         &[Course::of("completed")],
         "--max-cost 0.0000001 --prices prices.toml",
@@ -243,17 +243,17 @@ fn a_file_that_was_edited_is_not_uploaded() {
     let text = std::fs::read_to_string(&path).unwrap();
     std::fs::write(&path, text.replace("color", "hue")).unwrap();
     let called = call_with(BLIND, &bench, &mock, "");
-    assert_eq!(called.code, Some(2), "{called:?}");
-    assert!(
-        called.stderr.contains("was changed after it was written"),
-        "{called:?}"
-    );
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 2
+    error: run/batch/part-1-m-001.jsonl: the file was changed after it was written: 1660 bytes expected; batch
+        cancel run frees its requests
+    ");
     assert_eq!(mock.count("POST files"), 0);
 }
 
 /// The form of a vendor's Batch API is known before anything is sent.
 #[test]
-fn a_batch_api_of_another_form_is_refused_before_anything_is_sent() {
+fn unknown_batch_api_is_refused_early() {
     let rows = [
         (
             "https://api.mistral.ai/v1",
@@ -277,13 +277,14 @@ fn a_batch_api_of_another_form_is_refused_before_anything_is_sent() {
 
 /// What the user says of files goes before what is known of the server: this one takes the purpose "batch" alone.
 #[test]
-fn the_purpose_of_files_is_that_of_the_server_unless_it_is_stated() {
+fn file_purpose_follows_server_or_flag() {
     let (_, mock, called) = blind(&[Course::of("completed")], "--purpose batch-api");
     assert_ne!(called.code, Some(0), "{called:?}");
-    assert!(
-        called.stderr.contains("the purpose must be batch"),
-        "{called:?}"
-    );
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 2
+    error: http://127.0.0.1:[PORT]/v1: part-1-m-001.jsonl: http://127.0.0.1:[PORT]/v1 answered 400: the purpose
+        must be batch; the batches of this run stay as they are, and the same command continues
+    ");
     assert_eq!(mock.count("POST batches"), 0);
     let (_, mock, called) = blind(&[Course::of("completed")], "");
     assert_eq!((called.code, mock.count("POST batches")), (Some(0), 1));

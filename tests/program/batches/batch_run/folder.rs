@@ -4,22 +4,22 @@ use super::{QUESTIONS, answered, assert_each_once, blind, call_with};
 use crate::support::batches::{Course, Line, MockBatches};
 use crate::support::endpoint::Answer;
 use crate::support::run::{Bench, called, words};
+use crate::support::snapshot::redacted;
 
 #[test]
-fn a_detached_run_is_looked_at_fetched_and_cancelled_by_its_folder() {
+fn folder_controls_detached_run() {
     let (bench, mock, called) = blind(
         &[Course::of("in_progress in_progress in_progress completed")],
         "--detach",
     );
-    assert_eq!(called.code, Some(0), "{called:?}");
-    assert!(
-        called
-            .stdout
-            .contains("part-1-m-001.jsonl: 4 requests to m, batch_1, submitted"),
-        "{called:?}"
-    );
+    insta::assert_snapshot!(called, @"
+    exit code: 0
+    stdout:
+    part-1-m-001.jsonl: 4 requests to m, batch_1, submitted
+    the same command, or batch fetch run, imports the replies; the same command also submits what waits
+    ");
     let status = bench.complete(&words("batch status run"));
-    assert!(status.contains("in_progress, 0 of 4"), "{status}");
+    insta::assert_snapshot!(redacted(&status), @"part-1-m-001.jsonl: 4 requests to m, batch_1, in_progress, 0 of 4");
     // The second look, then the fourth.
     let early = bench.call(&words("batch fetch run"));
     assert_eq!(
@@ -29,11 +29,18 @@ fn a_detached_run_is_looked_at_fetched_and_cancelled_by_its_folder() {
     );
     bench.call(&words("batch fetch run"));
     let fetched = bench.call(&words("batch fetch run"));
-    assert_eq!(fetched.code, Some(0), "{fetched:?}");
-    assert!(
-        fetched.stdout.contains("completed: 4 answered, 0 not"),
-        "{fetched:?}"
-    );
+    insta::assert_snapshot!(fetched, @"
+    exit code: 0
+    stdout:
+    part-1-m-001.jsonl: 4 requests to m, batch_1, completed: 4 answered, 0 not
+    m · 4 questions · 1 frame · 4 replies, 0 failed · intervals by question
+    ! Only 4 questions (8 are needed): intervals and tests are rough.
+
+     accuracy in %
+     without images: m 100.0 [51.0, 100.0] · chance 33.3
+    run: run
+    report: run/report.html
+    ");
     assert_each_once(&bench, &mock, QUESTIONS);
     mock.with(|server| assert!(server.files.iter().all(|file| file.deleted)));
 
@@ -41,11 +48,21 @@ fn a_detached_run_is_looked_at_fetched_and_cancelled_by_its_folder() {
         .lines(|i| if i < 1 { Line::Right } else { Line::Absent });
     let (bench, mock, _) = blind(&[course, Course::of("completed")], "--detach");
     let cancelled = bench.call(&words("batch cancel run --poll 0.02"));
-    assert_eq!(cancelled.code, Some(1), "{cancelled:?}");
-    assert!(
-        cancelled.stdout.contains("cancelled: 1 answered, 3 not"),
-        "{cancelled:?}"
-    );
+    insta::assert_snapshot!(cancelled, @"
+    exit code: 1
+    stdout:
+    part-1-m-001.jsonl: 4 requests to m, batch_1, cancelled: 1 answered, 3 not
+    m · 4 questions · 1 frame · 1 reply, 3 failed · intervals by question
+    ! run: incomplete: 1 of 4 trials answered, 3 failed. The same command asks the
+      rest.
+    ! 3 trials of m failed and are not scored.
+    ! Only 4 questions (8 are needed): intervals and tests are rough.
+
+     accuracy in %
+     without images: m 100.0 [20.7, 100.0] · chance 33.3
+    run: run
+    report: run/report.html
+    ");
     assert_eq!(
         (mock.count("POST batches/id/cancel"), answered(&bench).len()),
         (1, 1)
@@ -65,7 +82,7 @@ fn a_detached_run_is_looked_at_fetched_and_cancelled_by_its_folder() {
 }
 
 #[test]
-fn built_in_models_and_other_folders_are_refused() {
+fn built_in_models_cannot_be_batched() {
     let bench = Bench::with_questions(QUESTIONS);
     for (args, message) in [
         (
@@ -82,11 +99,17 @@ fn built_in_models_and_other_folders_are_refused() {
 }
 
 #[test]
-fn what_waits_for_the_quota_is_freed_by_a_cancel() {
+fn cancel_frees_parts_awaiting_quota() {
     let full = Answer::error(429, "token_limit_exceeded", "too many enqueued tokens");
     let (bench, mock, called) = blind(&[Course::refused(full)], "--detach");
-    assert_eq!(called.code, Some(0), "{called:?}");
-    assert!(called.stdout.contains("no batch, not submitted yet"));
+    insta::assert_snapshot!(called, @"
+    exit code: 0
+    stdout:
+    part-1-m-001.jsonl: 4 requests to m, no batch, not submitted yet
+    the same command, or batch fetch run, imports the replies; the same command also submits what waits
+    stderr:
+     WARN m: too many tokens wait for batches (too many enqueued tokens); further ones are submitted later
+    ");
     // A look submits nothing.
     let looked = bench.call(&words("batch fetch run"));
     assert_eq!((looked.code, mock.count("POST batches")), (Some(1), 1));
@@ -104,11 +127,14 @@ fn what_waits_for_the_quota_is_freed_by_a_cancel() {
 }
 
 #[test]
-fn another_address_than_that_of_the_batches_is_left_alone() {
+fn batches_of_other_address_stay() {
     let (bench, mock, _) = blind(&[Course::of("completed")], "--detach");
     let elsewhere = "batch cancel run --base-url http://127.0.0.1:9/v1 --poll 0.02";
     let called = bench.call(&words(elsewhere));
-    assert!(called.stderr.contains("are left alone"), "{called:?}");
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 1
+     WARN batches at http://127.0.0.1:[PORT]/v1 are left alone; name that address, with its key
+    ");
     assert_eq!(mock.count("POST batches/id/cancel"), 0);
     let fetched = bench.call(&words("batch fetch run"));
     assert_eq!((fetched.code, answered(&bench).len()), (Some(0), QUESTIONS));
@@ -116,7 +142,7 @@ fn another_address_than_that_of_the_batches_is_left_alone() {
 
 /// A stranger's folder may name any address, and may name parts by paths.
 #[test]
-fn no_key_goes_to_an_address_that_only_the_folder_names() {
+fn no_key_for_address_in_folder() {
     let (bench, _, _) = blind(&[Course::of(&"in_progress ".repeat(100))], "--detach");
     let stranger = MockBatches::start([Course::of("in_progress")]);
     let state = bench.path("run/batch/state.jsonl");
@@ -157,11 +183,15 @@ fn no_key_goes_to_an_address_that_only_the_folder_names() {
     // Another machine is refused without a key, too; no other header goes anywhere.
     std::fs::write(&state, text.replace(&own, "https://gateway.example/v1")).unwrap();
     let other = bench.call(&words("batch fetch run"));
-    assert!(other.stderr.contains("may be a stranger's"), "{other:?}");
+    insta::assert_snapshot!(other.messages(), @"
+    exit code: 2
+    error: --base-url: only the run folder names the address https://gateway.example/v1, and it may be a
+        stranger's: to send your key there, name it with --base-url https://gateway.example/v1
+    ");
 }
 
 #[test]
-fn a_part_is_a_name_and_not_a_path() {
+fn part_is_name_not_path() {
     let (bench, _, _) = blind(&[Course::of("completed")], "--detach");
     let state = bench.path("run/batch/state.jsonl");
     let text = std::fs::read_to_string(&state).unwrap();

@@ -16,7 +16,7 @@ fn assert_stopped(mock: &MockBatches, called: &Called, case: &str) {
 }
 
 #[test]
-fn an_output_that_is_named_later_is_waited_for() {
+fn late_output_is_awaited() {
     let course = Course::of("in_progress completed").late(4);
     let (bench, mock, called) = blind(&[course], "");
     assert_eq!(called.code, Some(0), "{called:?}");
@@ -25,7 +25,7 @@ fn an_output_that_is_named_later_is_waited_for() {
 }
 
 #[test]
-fn an_output_with_too_few_lines_stops_the_run() {
+fn short_output_stops_the_run() {
     for (order, replies) in [(Order::Cut, QUESTIONS - 1), (Order::Empty, 0)] {
         let courses = [
             Course::of("completed").order(order),
@@ -46,14 +46,14 @@ fn an_output_with_too_few_lines_stops_the_run() {
     }
 }
 
-/// Asserts that every trial has a reply, and that the second batch has so many requests.
+/// Asserts that every trial has a reply, and that the second batch has `again` requests.
 fn assert_each_once_but_lost(bench: &Bench, mock: &MockBatches, again: usize) {
     assert_eq!(answered(bench).len(), QUESTIONS);
     assert_eq!(mock.asked()[1].len(), again);
 }
 
 #[test]
-fn a_file_of_the_servers_page_ends_the_wait() {
+fn file_of_servers_page_ends_wait() {
     let (bench, mock, called) = blind(&[Course::of("completed").order(Order::Cut)], "");
     assert_stopped(&mock, &called, "cut");
     let id = mock.asked()[0][QUESTIONS - 1].clone();
@@ -61,14 +61,25 @@ fn a_file_of_the_servers_page_ends_the_wait() {
     let line = format!(r#"{{"custom_id":"{id}","response":{{"status_code":200,"body":{body}}}}}"#);
     bench.file("page.jsonl", line + "\n");
     let imported = bench.call(&words("batch import run page.jsonl"));
-    assert!(imported.stdout.contains("1 imported"), "{imported:?}");
+    insta::assert_snapshot!(imported, @"
+    exit code: 0
+    stdout:
+    replies: 1 imported, 0 failed
+    m · 4 questions · 1 frame · 4 replies, 0 failed · intervals by question
+    ! Only 4 questions (8 are needed): intervals and tests are rough.
+
+     accuracy in %
+     without images: m 100.0 [51.0, 100.0] · chance 33.3
+    run: run
+    report: run/report.html
+    ");
     let called = call_with(BLIND, &bench, &mock, "");
     assert_eq!(called.code, Some(0), "{called:?}");
     assert_each_once(&bench, &mock, QUESTIONS);
 }
 
 #[test]
-fn an_output_that_is_deleted_ends_with_a_message() {
+fn deleted_output_stops_with_message() {
     let bench = Bench::with_questions(QUESTIONS);
     let mock = MockBatches::start([Course::of("completed")]);
     for _ in 0..10 {
@@ -77,24 +88,36 @@ fn an_output_that_is_deleted_ends_with_a_message() {
     }
     let called = call_with(BLIND, &bench, &mock, "");
     assert_stopped(&mock, &called, "deleted");
-    assert!(called.stderr.contains("No such File object"), "{called:?}");
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 2
+     WARN part-1-m-001.jsonl: batch batch_1: its file file-2 cannot be fetched: http://127.0.0.1:[PORT]/v1
+        answered 404: No such File object; looked at again
+    error: http://127.0.0.1:[PORT]/v1: part-1-m-001.jsonl: batch batch_1: its file file-2 cannot be fetched:
+        http://127.0.0.1:[PORT]/v1 answered 404: No such File object; nothing is asked again or deleted. The same
+        command looks again; batch import run FILE imports a file of the server's page; batch cancel run frees the
+        rest
+    ");
 }
 
 /// A server that counts only some of the requests of a batch that it calls completed.
 #[test]
-fn counts_that_are_not_complete_are_waited_for() {
+fn incomplete_counts_are_awaited() {
     let (bench, mock, called) = blind(&[Course::of("completed").uncounted(1)], "");
     assert_stopped(&mock, &called, "uncounted");
     assert_eq!(answered(&bench).len(), QUESTIONS);
 }
 
 #[test]
-fn fetch_imports_nothing_of_an_incomplete_batch() {
+fn fetch_imports_nothing_of_incomplete_batch() {
     let courses = [Course::of("completed").order(Order::Cut)];
     let (bench, mock, _) = blind(&courses, "--detach");
     let fetched = bench.call(&words("batch fetch run"));
-    assert_eq!(fetched.code, Some(1), "{fetched:?}");
-    assert!(fetched.stderr.contains("look again later"), "{fetched:?}");
+    insta::assert_snapshot!(fetched.messages(), @"
+    exit code: 1
+     WARN part-1-m-001.jsonl: batch batch_1: the server counts 4 replies, and its files have 3; nothing is
+        imported, asked again or deleted; look again later (the command of the run without --detach, or batch
+        cancel, ends the wait)
+    ");
     assert_eq!(
         (answered(&bench).len(), mock.count("DELETE files/id")),
         (0, 0)
@@ -102,7 +125,7 @@ fn fetch_imports_nothing_of_an_incomplete_batch() {
 }
 
 #[test]
-fn failures_without_a_line_are_asked_again_as_counted() {
+fn uncounted_failures_are_asked_again() {
     let some = Course::of("completed").lines(|i| [Line::Right, Line::Absent][i % 2]);
     let (bench, mock, called) = blind(&[some, Course::of("completed")], "");
     assert_eq!(called.code, Some(0), "{called:?}");
@@ -110,7 +133,7 @@ fn failures_without_a_line_are_asked_again_as_counted() {
 }
 
 #[test]
-fn a_reply_counts_after_a_failure_of_its_request() {
+fn reply_after_failure_counts() {
     let course = Course::of("in_progress completed").order(Order::AfterFailures);
     let (bench, mock, called) = blind(&[course], "");
     assert_eq!(called.code, Some(0), "{called:?}");
@@ -118,7 +141,7 @@ fn a_reply_counts_after_a_failure_of_its_request() {
 }
 
 #[test]
-fn an_expired_batch_without_counts_is_waited_for() {
+fn expired_batch_without_counts_is_awaited() {
     let course = Course::of("in_progress expired").late(4).late_to_count();
     let (bench, mock, called) = blind(&[course], "");
     assert_eq!(called.code, Some(0), "{called:?}");
@@ -127,45 +150,46 @@ fn an_expired_batch_without_counts_is_waited_for() {
 }
 
 #[test]
-fn a_cancelled_batch_is_fetched_before_its_files_are_deleted() {
+fn cancelled_batch_is_fetched_before_deletion() {
     let course = Course::of(&"in_progress ".repeat(1000))
         .lines(|i| if i < 1 { Line::Right } else { Line::Absent })
         .late(3);
     let (bench, _mock, _) = blind(&[course, Course::of("completed")], "--detach");
     let cancelled = bench.call(&words("batch cancel run --poll 0.02"));
-    assert!(
-        cancelled.stdout.contains("cancelled: 1 answered, 3 not"),
-        "{cancelled:?}"
-    );
+    insta::assert_snapshot!(cancelled.lines_with("cancelled"), @"
+    exit code: 1
+    part-1-m-001.jsonl: 4 requests to m, batch_1, cancelled: 1 answered, 3 not
+    ");
     assert_eq!(answered(&bench).len(), 1);
 }
 
 #[test]
-fn files_of_a_cancelled_batch_stay_if_they_are_incomplete() {
+fn incomplete_cancelled_batch_keeps_files() {
     let course = Course::of(&"in_progress ".repeat(1000))
         .lines(|i| if i < 1 { Line::Right } else { Line::Absent })
         .late(1000);
     let (bench, mock, _) = blind(&[course], "--detach");
     let cancelled = bench.call(&words("batch cancel run --poll 0.02"));
-    assert!(
-        cancelled.stderr.contains("its files stay at the server"),
-        "{cancelled:?}"
-    );
+    insta::assert_snapshot!(cancelled.messages(), @"
+    exit code: 1
+     WARN part-1-m-001.jsonl: batch batch_1: the server counts 1 replies, and its files have 0; looked at again
+     WARN part-1-m-001.jsonl: batch batch_1: the server counts 1 replies, and its files have 0; its files stay at
+        the server, and its requests may be asked and paid again
+    ");
     assert_eq!(mock.count("DELETE files/id"), 0);
 }
 
 #[test]
-fn lost_trials_of_a_batch_are_not_paid_again() {
+fn lost_batch_trials_are_not_repaid() {
     let course = Course::of("in_progress in_progress in_progress completed");
     let (bench, mock, _) = blind(&[course, Course::of("completed")], "--detach");
     std::fs::remove_file(bench.path("run/batch/trials.jsonl")).unwrap();
     let called = call_with(BLIND, &bench, &mock, "");
-    assert_eq!(called.code, Some(2), "{called:?}");
-    assert!(
-        called
-            .stderr
-            .contains("4 trials of part-1-m-001.jsonl, whose batch is at the server, are missing"),
-        "{called:?}"
-    );
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 2
+    error: run/batch/trials.jsonl: 4 trials of part-1-m-001.jsonl, whose batch is at the server, are missing:
+        restore this file from a copy; without it they would be asked and paid again. Without a copy, cancel the
+        batch on the server's page and delete run/batch
+    ");
     assert_eq!(mock.count("POST batches"), 1);
 }

@@ -31,7 +31,7 @@ fn a_full_quota_is_a_wait() {
 }
 
 #[test]
-fn only_as_many_tokens_wait_as_the_server_allows() {
+fn waiting_tokens_respect_server_limit() {
     let bench = Bench::with_questions(QUESTIONS);
     let mock = MockBatches::start([Course::of("in_progress in_progress completed")]);
     // About 60 tokens a question: one a part.
@@ -61,7 +61,7 @@ fn only_as_many_tokens_wait_as_the_server_allows() {
 }
 
 #[test]
-fn a_part_that_is_too_large_for_the_quota_is_divided() {
+fn part_over_quota_is_split() {
     let words = "Enqueued token limit reached for m in organization o. Limit: 120 enqueued tokens.";
     let small = Course::refused(Answer::error(429, "token_limit_exceeded", words));
     let (bench, mock, called) = blind(&[small, Course::of("completed")], "");
@@ -81,12 +81,16 @@ fn a_part_that_is_too_large_for_the_quota_is_divided() {
     let tiny = Course::refused(Answer::error(429, "x", "enqueued tokens: Limit: 7 tokens"));
     let mock = MockBatches::start([tiny]);
     let called = call_with(BLIND, &bench, &mock, "");
-    assert_eq!(called.code, Some(2), "{called:?}");
-    assert!(called.stderr.contains("--image max-side"), "{called:?}");
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 2
+     WARN m: at most 7 tokens may wait for batches; further ones are submitted when others have ended
+    error: http://127.0.0.1:[PORT]/v1: part-1-m-001.jsonl: one request has about 64 tokens, more than may wait for
+        batches of m; send smaller images with --image max-side=N
+    ");
 }
 
 #[test]
-fn a_limit_of_cost_is_kept_at_the_price_of_batches() {
+fn cost_limit_uses_batch_price() {
     let prices = "as-of = \"2026-01-01\"\nbatch = 0.5\n[models]\nm = { input = 10, output = 10 }\n";
     let bench = Bench::with_questions(QUESTIONS);
     bench.file("prices.toml", prices);
@@ -100,8 +104,11 @@ fn a_limit_of_cost_is_kept_at_the_price_of_batches() {
         call_with(BLIND, &bench, &mock, &more)
     };
     let called = limited("0.002");
-    assert_eq!(called.code, Some(3), "{called:?}");
-    assert!(called.stderr.contains("--max-cost"), "{called:?}");
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 3
+     WARN stopped: one more batch could exceed the $0.0020 of --max-cost; the same command with a higher limit
+        continues, and batch cancel frees the requests that wait
+    ");
     assert_eq!(answered(&bench).len(), 2, "{called:?}");
     let called = limited("0.01");
     assert_eq!(called.code, Some(0), "{called:?}");
@@ -109,7 +116,7 @@ fn a_limit_of_cost_is_kept_at_the_price_of_batches() {
 }
 
 #[test]
-fn a_limit_of_cost_is_kept_for_models_of_a_file() {
+fn cost_limit_holds_for_file_models() {
     // The name in tables has no row in the table of prices; the id has one, or the file states the price.
     let table = "as-of = \"2026-01-01\"\nbatch = 0.5\n[models]\nm = { input = 10, output = 10 }\n";
     let other =
@@ -145,7 +152,7 @@ fn a_limit_of_cost_is_kept_for_models_of_a_file() {
 
 /// Replies that are as long as their limit, where a letter was expected.
 #[test]
-fn a_batch_is_bounded_by_its_token_limit() {
+fn token_limit_bounds_batch() {
     let bench = Bench::with_questions(40);
     let prices = "as-of = \"2026-01-01\"\nbatch = 0.5\n[models]\nm = { input = 1, output = 100 }\n";
     bench.file("prices.toml", prices);
@@ -169,7 +176,7 @@ fn a_batch_is_bounded_by_its_token_limit() {
 
 /// Batches that are out count against the limit of a run that asks directly.
 #[test]
-fn a_direct_run_leaves_room_for_its_batches() {
+fn direct_run_leaves_room_for_batches() {
     let bench = Bench::with_questions(QUESTIONS);
     let prices = "as-of = \"2026-01-01\"\nbatch = 0.5\n[models]\nm = { input = 1, output = 100 }\n";
     bench.file("prices.toml", prices);

@@ -58,7 +58,7 @@ fn answered(bench: &Bench) -> Vec<Value> {
     records
 }
 
-/// Asserts that so many trials have one right reply each, and that none was in two batches that were begun.
+/// Asserts that `trials` trials have one right reply each, and that no trial was in two started batches.
 fn assert_each_once(bench: &Bench, mock: &MockBatches, trials: usize) {
     let answered = answered(bench);
     assert_eq!(answered.len(), trials);
@@ -69,7 +69,7 @@ fn assert_each_once(bench: &Bench, mock: &MockBatches, trials: usize) {
 }
 
 #[test]
-fn batches_are_submitted_and_their_replies_taken_over() {
+fn batches_are_submitted_and_imported() {
     let bench = Bench::with_questions(QUESTIONS);
     let mock = MockBatches::start([Course::of("validating in_progress finalizing completed")]);
     let called = call_with(RUN, &bench, &mock, "");
@@ -92,7 +92,7 @@ fn batches_are_submitted_and_their_replies_taken_over() {
 }
 
 #[test]
-fn a_refused_field_costs_one_request_or_one_batch() {
+fn refused_field_costs_one_batch() {
     // Directly before the batches.
     let bench = Bench::with_questions(QUESTIONS);
     let mock = MockBatches::start([Course::of("completed")]);
@@ -142,7 +142,7 @@ fn a_refused_field_costs_one_request_or_one_batch() {
 }
 
 #[test]
-fn open_answers_and_their_marks_go_through_batches_one_after_the_other() {
+fn answers_and_marks_use_batches() {
     let house = House::new();
     let mock = MockBatches::start([
         Course::of("in_progress completed").text("brown"),
@@ -151,8 +151,15 @@ fn open_answers_and_their_marks_go_through_batches_one_after_the_other() {
     let base = mock.base_url();
     let more = "--judge j --levels L0,L4 --out run --batch-run --no-scout --poll 0.02";
     let called = house.call(&model_args(&base, more));
-    assert_eq!(called.code, Some(0), "{called:?}");
-    assert!(called.stdout.contains("75.0"), "{called:?}");
+    insta::assert_snapshot!(called.lines_with("75.0"), @"
+    exit code: 0
+     m       with noise   75.0   75.0 (0.0)   6 of 6   −28.2 +16.1
+     m       with noise   hm3d-v0                 75.0   75.0 (0.0)   −57.6 +22.7
+                          scannet-v0              75.0   75.0 (0.0)   −63.2 +23.5
+                          attribute recognition   75.0   75.0 (0.0)   −63.2 +23.5
+                          object localization     75.0   75.0 (0.0)   −63.2 +23.5
+                          world knowledge         75.0   75.0 (0.0)   −63.2 +23.5
+    ");
     mock.with(|server| {
         let models: Vec<&Value> = server
             .batches

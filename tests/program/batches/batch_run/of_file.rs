@@ -32,7 +32,7 @@ fn call(bench: &Bench, line: &str) -> Called {
 }
 
 #[test]
-fn batches_of_a_model_are_made_with_its_own_key() {
+fn batches_use_key_of_model() {
     let mock = MockBatches::start([Course::of("in_progress completed")]);
     let keys = [
         "name = \"A\"\nid = \"m\"\nkey-env = \"TEAM_A\"",
@@ -75,7 +75,7 @@ fn batches_of_a_model_are_made_with_its_own_key() {
 }
 
 #[test]
-fn models_with_one_key_are_fetched_by_their_folder() {
+fn folder_fetches_models_with_one_key() {
     let mock = MockBatches::start([Course::of("completed")]);
     let keys = ["id = \"m\"\nrpm = 100", "id = \"n\"\nrpm = 200"];
     let bench = bench_of_two(&mock, keys);
@@ -87,7 +87,7 @@ fn models_with_one_key_are_fetched_by_their_folder() {
 }
 
 #[test]
-fn a_field_that_is_refused_in_a_batch_is_left_out_for_that_model() {
+fn refused_batch_field_affects_one_model() {
     let refused = Course::of("completed").lines(|_| Line::Status(400, TEMPERATURE));
     let mock = MockBatches::start([Course::of("completed"), refused, Course::of("completed")]);
     let keys = [
@@ -113,7 +113,7 @@ fn a_field_that_is_refused_in_a_batch_is_left_out_for_that_model() {
 }
 
 #[test]
-fn a_refused_field_costs_the_batches_that_were_out() {
+fn refused_field_costs_submitted_batches() {
     let refused = Course::of("completed").lines(|_| Line::Status(400, TEMPERATURE));
     let courses = [refused.clone(), refused, Course::of("completed")];
     let (bench, mock, called) = super::blind(&courses, "--file-requests 2");
@@ -123,7 +123,7 @@ fn a_refused_field_costs_the_batches_that_were_out() {
 }
 
 #[test]
-fn a_model_that_cannot_be_asked_stops_alone() {
+fn unusable_model_stops_alone() {
     let mock = MockBatches::start([Course::of("completed")]);
     mock.chat(|body| match body["model"].as_str() {
         Some("typo") => Answer::error(404, "model_not_found", "no such model"),
@@ -131,11 +131,12 @@ fn a_model_that_cannot_be_asked_stops_alone() {
     });
     let bench = bench_of_two(&mock, ["id = \"typo\"", "id = \"m\""]);
     let called = call(&bench, RUN);
-    assert_eq!(called.code, Some(1), "{called:?}");
-    assert!(
-        called.stdout.contains("! not asked any further"),
-        "{called:?}"
-    );
+    insta::assert_snapshot!(called.lines_with("not asked"), @"
+    exit code: 1
+    ! not asked any further: http://127.0.0.1:[PORT]/v1: typo: http://127.0.0.1:[PORT]/v1 answered 404: no such
+        model (the server knows no model of this name: check --model and --base-url) (replies so far are stored;
+        the same command continues)
+    ");
     let models: BTreeSet<String> = answered(&bench)
         .iter()
         .map(|record| record["model"].as_str().unwrap().to_owned())
@@ -147,7 +148,7 @@ fn a_model_that_cannot_be_asked_stops_alone() {
 }
 
 #[test]
-fn a_vendor_that_refuses_batches_stops_its_models_alone() {
+fn vendor_refusing_batches_stops_its_models() {
     let (one, two) = (
         MockBatches::start([Course::failing("x", "this line is no JSON", &Value::Null)]),
         MockBatches::start([Course::of("in_progress completed")]),
@@ -159,15 +160,29 @@ fn a_vendor_that_refuses_batches_stops_its_models_alone() {
     };
     bench.file("models.toml", table("m", &one) + &table("n", &two));
     let called = call(&bench, &format!("{RUN} --no-scout"));
-    assert_eq!(called.code, Some(1), "{called:?}");
-    assert!(called.stdout.contains("this line is no JSON"), "{called:?}");
+    insta::assert_snapshot!(called, @"
+    exit code: 1
+    stdout:
+    2 models · 4 questions · 1 frame · 4 replies, 4 failed · intervals by question
+    ! run: stopped: 4 of 8 trials answered, 4 failed. The same command asks the
+      rest.
+    ! 4 trials of m failed and are not scored.
+    ! Only 4 questions (8 are needed): intervals and tests are rough.
+
+     accuracy in %
+     without images: n 100.0 [51.0, 100.0] · chance 33.3
+    run: run
+    report: run/report.html
+    ! not asked any further: http://127.0.0.1:[PORT]/v1: part-1-m-001.jsonl: the batch batch_1 failed: this line
+        is no JSON (x); none of its requests has a reply
+    ");
     assert_eq!(answered(&bench).len(), QUESTIONS);
     // What cannot be begun is not tried again by the same command.
     assert_eq!(one.count("POST batches"), 1);
 }
 
 #[test]
-fn a_detached_run_keeps_how_its_requests_were_changed() {
+fn detached_run_keeps_adapted_requests() {
     let mock = MockBatches::start([Course::of("completed")]);
     mock.chat(|body| match body.get("temperature") {
         Some(_) => Answer::error(400, "unsupported_value", TEMPERATURE),

@@ -7,6 +7,7 @@ use std::fs;
 
 use serde_json::Value;
 
+use crate::support::snapshot::redacted;
 use house::{ANNOTATED, House, PLAIN};
 
 const BED: &str = "00800-aaaaAAAA111";
@@ -44,12 +45,18 @@ fn walks_become_frames_and_questions() {
     let house = house();
     walks(&house);
     let said = house.render(ANNOTATED, "renders", &["--walks", "states"], 0);
-    assert!(said.contains("10 states a second"), "{said}");
+    insta::assert_snapshot!(redacted(&said), @"
+    the rate of walks is not stored: times are those of 10 states a second
+    003-hm3d-ddddDDDD444: skipped: no folder NNNNN-ddddDDDD444 in --hm3d
+    00800-aaaaAAAA111: 3 frames (1 of 3 scenes)
+    00801-bbbbBBBB222: 2 frames (2 of 3 scenes)
+    00802-ccccCCCC333: skipped: no .semantic.txt
+    renders: 5 frames of 2 scenes; 2 skipped, 0 refused
+    ");
     let record = house.json("renders/scenes.json");
     let skipped = names(&record["skipped"]);
     let skipped: Vec<&str> = skipped.iter().map(|(name, _)| name.as_str()).collect();
     assert_eq!(skipped, ["003-hm3d-ddddDDDD444", UNANNOTATED]);
-    assert!(said.contains("00802-ccccCCCC333: skipped: no .semantic.txt"));
 
     house.import("renders", "frames");
     let lines = house.lines("frames/frames.jsonl");
@@ -90,7 +97,7 @@ fn walks_become_frames_and_questions() {
 }
 
 #[test]
-fn places_that_cover_a_scene_become_frames_and_questions() {
+fn covering_places_become_frames_and_questions() {
     let house = house();
     house.render(ANNOTATED, "renders", &["--cover"], 0);
     let record = house.json("renders/scenes.json");
@@ -124,7 +131,7 @@ fn places_that_cover_a_scene_become_frames_and_questions() {
 }
 
 #[test]
-fn the_same_seed_gives_the_same_bytes_and_another_gives_others() {
+fn seed_decides_the_bytes() {
     let house = house();
     for (out, seed) in [("a", "3"), ("b", "3"), ("c", "4")] {
         let flags = ["--cover", "--seed", seed, "--scenes", "aaaaAAAA111"];
@@ -137,7 +144,7 @@ fn the_same_seed_gives_the_same_bytes_and_another_gives_others() {
 }
 
 #[test]
-fn what_is_rendered_is_not_rendered_again() {
+fn rendered_scenes_are_not_repeated() {
     let house = house();
     walks(&house);
     let flags = ["--walks", "states"];
@@ -148,7 +155,14 @@ fn what_is_rendered_is_not_rendered_again() {
         ["aaaaAAAA111.basis.glb", "bbbbBBBB222.basis.glb"]
     );
     let said = house.render(ANNOTATED, "renders", &flags, 0);
-    assert!(said.contains("00800-aaaaAAAA111: done already"), "{said}");
+    insta::assert_snapshot!(redacted(&said), @"
+    the rate of walks is not stored: times are those of 10 states a second
+    003-hm3d-ddddDDDD444: skipped: no folder NNNNN-ddddDDDD444 in --hm3d
+    00800-aaaaAAAA111: done already
+    00801-bbbbBBBB222: done already
+    00802-ccccCCCC333: skipped: no .semantic.txt
+    renders: 5 frames of 2 scenes; 2 skipped, 0 refused
+    ");
     assert_eq!(house.opened().len(), 2);
     assert_eq!(house.files("renders"), before);
 
@@ -165,20 +179,36 @@ fn what_is_rendered_is_not_rendered_again() {
         &["--walks", "states", "--every", "1"],
         1,
     );
-    assert!(said.contains("another every_s"), "{said}");
+    insta::assert_snapshot!(redacted(&said), @"
+    the rate of walks is not stored: times are those of 10 states a second
+    003-hm3d-ddddDDDD444: skipped: no folder NNNNN-ddddDDDD444 in --hm3d
+    hm3d_frames.py: renders/00800-aaaaAAAA111 was rendered with another every_s: take another --out
+    ");
     fs::create_dir(house.path("renders").join(UNANNOTATED)).unwrap();
     let said = house.render(ANNOTATED, "renders", &flags, 1);
-    assert!(said.contains("has no done.json"), "{said}");
+    insta::assert_snapshot!(redacted(&said), @"
+    the rate of walks is not stored: times are those of 10 states a second
+    003-hm3d-ddddDDDD444: skipped: no folder NNNNN-ddddDDDD444 in --hm3d
+    hm3d_frames.py: renders/00802-ccccCCCC333 exists, but has no done.json: remove it, or take another --out
+    ");
 }
 
 #[test]
-fn an_archive_of_states_is_read_without_being_unpacked() {
+fn state_archive_is_read_unpacked() {
     let house = house();
     walks(&house);
     house.render(ANNOTATED, "from-folder", &["--walks", "states"], 0);
     house.archive("states.tgz", "hm3d-v0/README");
     let said = house.render(ANNOTATED, "from-archive", &["--walks", "states.tgz"], 0);
-    assert!(said.contains("not OpenEQA's archive v0"), "{said}");
+    insta::assert_snapshot!(redacted(&said), @"
+    states.tgz: md5 [DIGEST], not OpenEQA's archive v0 ([DIGEST])
+    the rate of walks is not stored: times are those of 10 states a second
+    003-hm3d-ddddDDDD444: skipped: no folder NNNNN-ddddDDDD444 in --hm3d
+    00800-aaaaAAAA111: 3 frames (1 of 3 scenes)
+    00801-bbbbBBBB222: 2 frames (2 of 3 scenes)
+    00802-ccccCCCC333: skipped: no .semantic.txt
+    from-archive: 5 frames of 2 scenes; 2 skipped, 0 refused
+    ");
     let (mut a, mut b) = (house.files("from-folder"), house.files("from-archive"));
     a.remove("scenes.json");
     b.remove("scenes.json");
@@ -186,24 +216,26 @@ fn an_archive_of_states_is_read_without_being_unpacked() {
 
     house.archive("evil.tgz", "hm3d-v0/../../outside.pkl");
     let said = house.render(ANNOTATED, "evil", &["--walks", "evil.tgz"], 1);
-    assert!(
-        said.contains("outside.pkl") && said.contains("leads out"),
-        "{said}"
-    );
+    insta::assert_snapshot!(redacted(&said), @"
+    evil.tgz: md5 [DIGEST], not OpenEQA's archive v0 ([DIGEST])
+    hm3d_frames.py: evil.tgz: the member 'hm3d-v0/../../outside.pkl' is a link or leads out of the archive;
+        nothing was rendered
+    ");
     fs::write(
         house.path("cut.tgz"),
         &fs::read(house.path("states.tgz")).unwrap()[..900],
     )
     .unwrap();
     let said = house.render(ANNOTATED, "cut", &["--walks", "cut.tgz"], 1);
-    assert!(
-        said.contains("cut.tgz: neither a folder nor a whole archive"),
-        "{said}"
-    );
+    insta::assert_snapshot!(redacted(&said), @"
+    cut.tgz: md5 [DIGEST], not OpenEQA's archive v0 ([DIGEST])
+    hm3d_frames.py: cut.tgz: neither a folder nor a whole archive of tar: Compressed file ended before the
+        end-of-stream marker was reached
+    ");
 }
 
 #[test]
-fn a_pickle_that_calls_anything_is_refused_by_name_and_not_run() {
+fn pickle_with_calls_is_refused() {
     let house = house();
     house.walk("000-hm3d-aaaaAAAA111", 3, "evil");
     house.walk("001-hm3d-bbbbBBBB222", 3, "attrs22");
@@ -215,9 +247,9 @@ fn a_pickle_that_calls_anything_is_refused_by_name_and_not_run() {
         name == BED && why.contains("000-hm3d-aaaaAAAA111/00002.pkl"),
         "{why}"
     );
-    assert!(
-        why.contains(".system, which no agent state needs; nothing of it was run"),
-        "{why}"
+    insta::assert_snapshot!(
+        redacted(why),
+        @"000-hm3d-aaaaAAAA111/00002.pkl: it names posix.system, which no agent state needs; nothing of it was run"
     );
     assert!(
         !house
@@ -245,26 +277,41 @@ fn a_pickle_that_calls_anything_is_refused_by_name_and_not_run() {
     )
     .unwrap();
     let said = house.render(ANNOTATED, "other", &["--walks", "states"], 1);
-    assert!(
-        said.contains("001-hm3d-bbbbBBBB222/00001.pkl: not the state of an agent"),
-        "{said}"
-    );
-    assert!(said.contains("no scene was rendered"), "{said}");
+    insta::assert_snapshot!(redacted(&said), @"
+    the rate of walks is not stored: times are those of 10 states a second
+    00800-aaaaAAAA111: refused: 000-hm3d-aaaaAAAA111/00002.pkl: it names posix.system, which no agent state needs;
+        nothing of it was run
+    00801-bbbbBBBB222: refused: 001-hm3d-bbbbBBBB222/00001.pkl: not the state of an agent: KeyError: 110
+    00802-ccccCCCC333: skipped: no .semantic.txt
+    hm3d_frames.py: no scene was rendered; other/scenes.json says why of each
+    ");
 }
 
 #[test]
-fn a_scene_without_any_semantic_number_is_refused_with_the_remedy() {
+fn scene_without_semantics_names_remedy() {
     let house = house();
     walks(&house);
     let said = house.render(PLAIN, "renders", &["--walks", "states"], 1);
-    let hint = "every semantic number of its first 3 frames is 0; habitat-sim writes 0 everywhere";
-    assert!(
-        said.contains(hint) && said.contains("set --config to"),
-        "{said}"
-    );
+    insta::assert_snapshot!(redacted(&said), @"
+    the rate of walks is not stored: times are those of 10 states a second
+    003-hm3d-ddddDDDD444: skipped: no folder NNNNN-ddddDDDD444 in --hm3d
+    00800-aaaaAAAA111: refused: every semantic number of its first 3 frames is 0; habitat-sim writes 0 everywhere
+        if the scene is not in the scene_dataset_config that it opens, or has no annotation there: set --config to
+        hm3d_annotated_basis.scene_dataset_config.json of the HM3D in which --hm3d lies
+    00801-bbbbBBBB222: refused: every semantic number of its first 2 frames is 0; habitat-sim writes 0 everywhere
+        if the scene is not in the scene_dataset_config that it opens, or has no annotation there: set --config to
+        hm3d_annotated_basis.scene_dataset_config.json of the HM3D in which --hm3d lies
+    00802-ccccCCCC333: skipped: no .semantic.txt
+    hm3d_frames.py: no scene was rendered; renders/scenes.json says why of each
+    ");
     assert!(!house.path("renders").join(BED).exists());
     let said = house.render(PLAIN, "cover", &["--cover", "--scenes", BED], 1);
-    assert!(said.contains("its first 8 frames is 0"), "{said}");
+    insta::assert_snapshot!(redacted(&said), @"
+    00800-aaaaAAAA111: refused: every semantic number of its first 8 frames is 0; habitat-sim writes 0 everywhere
+        if the scene is not in the scene_dataset_config that it opens, or has no annotation there: set --config to
+        hm3d_annotated_basis.scene_dataset_config.json of the HM3D in which --hm3d lies
+    hm3d_frames.py: no scene was rendered; cover/scenes.json says why of each
+    ");
 }
 
 #[test]
@@ -301,7 +348,7 @@ fn wrong_calls_say_what_is_expected() {
         assert!(said.contains(says), "{flags:?}: {said}");
     }
     let said = house.render("nowhere.json", "out", &["--cover"], 1);
-    assert!(said.contains("nowhere.json: no such file"), "{said}");
+    insta::assert_snapshot!(redacted(&said), @"hm3d_frames.py: --config HM3D/nowhere.json: no such file");
     fs::write(
         house
             .path("HM3D/val")
@@ -311,11 +358,14 @@ fn wrong_calls_say_what_is_expected() {
     )
     .unwrap();
     let said = house.render(ANNOTATED, "out", &["--cover", "--scenes", BED], 1);
-    assert!(said.contains("no navigation mesh"), "{said}");
+    insta::assert_snapshot!(redacted(&said), @"
+    00800-aaaaAAAA111: refused: it has no navigation mesh (.basis.navmesh), which --cover needs
+    hm3d_frames.py: no scene was rendered; out/scenes.json says why of each
+    ");
 }
 
 #[test]
-fn the_rules_of_the_script_hold_one_by_one() {
+fn script_rules_hold_individually() {
     let house = House::new();
     house.check(include_str!("check_rules.py"));
 }
@@ -324,15 +374,15 @@ fn the_rules_of_the_script_hold_one_by_one() {
 const ISLANDS: &str = r#"{"room": [0, 0, 0, 6, 2.6, 5], "boxes": [], "islands": []}"#;
 
 #[test]
-fn only_the_kind_habitat_has_a_script() {
+fn only_kind_habitat_has_script() {
     let house = House::new();
     let said = house.program(&["import", "nyu", "--script"], 2);
-    assert!(
-        said.contains("only the kind habitat has a script, not nyu"),
-        "{said}"
-    );
+    insta::assert_snapshot!(redacted(&said), @"error: KIND: only the kind habitat has a script, not nyu");
     let said = house.program(&["import", "script", "habitat", "--every", "2"], 2);
-    assert!(said.contains("--every"), "{said}");
+    insta::assert_snapshot!(
+        redacted(&said),
+        @"error: unexpected argument '--every' found; tip: to pass '--every' as a value, use '-- --every'"
+    );
     let said = house.program(&["import", "habitat"], 2);
-    assert!(said.contains("--src") && said.contains("--out"), "{said}");
+    insta::assert_snapshot!(redacted(&said), @"error: the following required arguments were not provided: --src <DIR> --out <DIR>");
 }

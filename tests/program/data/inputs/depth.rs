@@ -52,7 +52,7 @@ fn linear(bytes: Vec<u8>) -> ImageFile {
 }
 
 #[test]
-fn every_code_is_darkened_before_it_is_rounded() {
+fn codes_darken_before_rounding() {
     let image = all_codes();
     for bytes in [
         png(&image),
@@ -87,7 +87,7 @@ fn every_code_is_darkened_before_it_is_rounded() {
 
 /// A picture of 8 bits that is stored in 16 is the same picture.
 #[test]
-fn eight_bits_in_sixteen_are_the_same_images() {
+fn eight_bits_in_sixteen_match() {
     let bench = Bench::new();
     let eight = RgbImage::from_fn(37, 21, |x, y| Rgb([(x * 6) as u8, (y * 12) as u8, 90]));
     let samples = eight
@@ -153,7 +153,7 @@ fn eight_bits_in_sixteen_are_the_same_images() {
 }
 
 #[test]
-fn profiles_of_16_bits_are_converted_in_16_bits() {
+fn sixteen_bit_profiles_keep_sixteen_bits() {
     let image = Image16::from_fn(16, 16, |x, y| {
         Rgb([(x * 4112) as u16, (y * 4112) as u16, 31_097])
     });
@@ -179,7 +179,7 @@ fn profiles_of_16_bits_are_converted_in_16_bits() {
 }
 
 #[test]
-fn linear_light_is_stated_by_the_flag_or_by_the_file() {
+fn linear_light_from_flag_or_file() {
     let image = Image16::from_fn(8, 8, |x, y| {
         Rgb([(x * 8000) as u16, (y * 100) as u16, 65_535])
     });

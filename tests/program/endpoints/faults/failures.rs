@@ -10,7 +10,7 @@ use crate::support::table::check_rows;
 
 /// Failures of this one request: it is not sent again, and others go on.
 #[test]
-fn what_is_wrong_with_one_request_fails_it_at_once() {
+fn single_request_faults_fail_at_once() {
     use FailureKind::{Filtered, Request, Response, Server};
     let bomb = vec![b' '; 300 << 20];
     let cases = [
@@ -106,7 +106,7 @@ fn what_is_wrong_with_one_request_fails_it_at_once() {
 
 /// Failures that every other request would meet: the run is to stop, and is told how to mend it.
 #[test]
-fn what_reaches_every_request_is_told_apart() {
+fn general_faults_are_told_apart() {
     let moved = |status| Answer::new(status, "").header("location", "https://elsewhere.example/v1");
     let cases = [
         ("401", Answer::error(401, "x", "no"), "--api-key-env"),

@@ -5,6 +5,7 @@ use serde_json::{Value, json};
 
 use super::{ask, ask_with, sending};
 use crate::support::endpoint::Answer;
+use crate::support::snapshot::redacted;
 
 /// Fields that a server does not take are sent otherwise from then on, where that was left to the program.
 #[test]
@@ -42,10 +43,10 @@ fn fields_are_adapted_once_for_all() {
     let outcome = ask_with(vec![heat()], sending(), stated);
     let error = outcome.result.unwrap_err();
     assert_eq!((error.reach, error.attempts), (Reach::Endpoint, 1));
-    assert!(
-        error.failure.message.contains("--temperature default"),
-        "{error}"
-    );
+    insta::assert_snapshot!(redacted(&error.failure.message), @"
+    http://127.0.0.1:[PORT]/v1 answered 400: Unsupported: 'temperature' is not supported with this model. (leave
+        the temperature to the server: --temperature default)
+    ");
     // A server that takes neither name gets no limit; one that refuses what is not sent any more is left.
     let neither = || refused("max_completion_tokens", "unsupported_parameter");
     let outcome = ask(vec![limit(), neither(), Answer::text("B")]);
@@ -70,7 +71,7 @@ fn fields_are_adapted_once_for_all() {
 
 /// Lists of details name the field by its place.
 #[test]
-fn a_field_is_known_by_the_place_in_a_list_of_details() {
+fn field_is_found_by_detail_location() {
     let details = json!({"object": "error", "message": {"detail": [
         {"type": "extra_forbidden", "loc": ["body", "max_tokens"], "msg": "Extra inputs are not permitted"},
     ]}});
@@ -81,7 +82,7 @@ fn a_field_is_known_by_the_place_in_a_list_of_details() {
 
 /// What the table says of servers on this machine; a model without such a switch is the server's to refuse.
 #[test]
-fn thinking_is_said_in_the_field_of_the_server() {
+fn thinking_uses_field_of_server() {
     let off = || Parameters {
         thinking: Some(Thinking::Off),
         ..Parameters::new("m".into())
@@ -102,7 +103,10 @@ fn thinking_is_said_in_the_field_of_the_server() {
     let outcome = ask_with(vec![refusal], sending(), off());
     let error = outcome.result.unwrap_err();
     assert_eq!((error.reach, error.attempts), (Reach::Endpoint, 1));
-    assert!(error.failure.message.contains("--thinking"), "{error}");
+    insta::assert_snapshot!(redacted(&error.failure.message), @"
+    http://127.0.0.1:[PORT]/v1 answered 400: Unknown parameter: 'chat_template_kwargs'. (leave --thinking out: the
+        model or its server has no such switch)
+    ");
     // Nothing is said unless it is asked for.
     let outcome = ask(vec![Answer::text("B")]);
     assert!(outcome.requests[0].get("chat_template_kwargs").is_none());

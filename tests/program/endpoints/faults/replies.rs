@@ -10,7 +10,7 @@ use crate::support::table::check_rows;
 /// Replies that are answers at the first request, with the text that is read and why the model stopped.
 #[test]
 #[expect(clippy::too_many_lines, reason = "a table")]
-fn a_message_is_found_in_every_shape() {
+fn message_is_found_in_every_shape() {
     let b = r#"{"role":"assistant","content":"B"}"#;
     let plain = completion(b);
     let http = |head: &str, body: &str| Answer::raw(format!("{head}\r\n\r\n{body}"));

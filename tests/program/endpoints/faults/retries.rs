@@ -8,6 +8,7 @@ use serde_json::json;
 
 use super::{PIECE, ask, ask_with, completion, gzip, sending, stream};
 use crate::support::endpoint::Answer;
+use crate::support::snapshot::redacted;
 use crate::support::table::{check_rows, check_rows_at_once};
 
 /// Failures that pass: the same request is sent again, and answered then.
@@ -233,7 +234,7 @@ fn waits_are_kept_and_capped() {
 
 /// Being turned away is a wait: it spends no retry, and only `--retries patience` ends it. A limit for the day ends it at once.
 #[test]
-fn a_request_that_is_turned_away_waits_and_spends_no_retry() {
+fn rejected_request_waits_without_retry() {
     let away = || Answer::error(429, "x", "slow").header("retry-after", "0.02");
     let patient = Sending {
         retries: 1,
@@ -253,10 +254,10 @@ fn a_request_that_is_turned_away_waits_and_spends_no_retry() {
         (error.failure.kind, error.reach),
         (FailureKind::RateLimit, Reach::Endpoint)
     );
-    assert!(
-        error.failure.message.contains("--retries patience"),
-        "{error}"
-    );
+    insta::assert_snapshot!(redacted(&error.failure.message), @"
+    http://127.0.0.1:[PORT]/v1 answered 429: slow (no request was accepted for [TIME], longer than --retries
+        patience; continue later with --resume)
+    ");
     assert!(error.attempts > 2, "{}", error.attempts);
     let daily =
         "Rate limit reached on requests per day (RPD): Limit 200. Please try again in 20ms.";

@@ -59,7 +59,7 @@ fn response(text: &str) -> Answer {
 }
 
 #[test]
-fn a_reply_is_the_same_by_every_wire() {
+fn reply_is_same_by_every_wire() {
     let whole = ask(vec![Answer::text("B.")]).result.unwrap();
     let pieces = ask_with(
         vec![streamed(&["B", "."])],
@@ -79,7 +79,7 @@ fn a_reply_is_the_same_by_every_wire() {
 }
 
 #[test]
-fn a_request_of_the_responses_api_has_its_form() {
+fn responses_request_has_correct_form() {
     let parameters = Parameters {
         reasoning_effort: Some("low".into()),
         ..by(WireSetting::Responses)
@@ -99,9 +99,9 @@ fn a_request_of_the_responses_api_has_its_form() {
     assert_eq!(body, expected);
 }
 
-/// What servers say, the answers after it, and the field of a request by which the wire is known.
+/// Refusals, the answers after them, and the request field that identifies the wire.
 #[test]
-fn auto_learns_the_wire_from_a_refusal() {
+fn auto_learns_wire_from_refusal() {
     let cases = [
         (
             Answer::error(
@@ -143,7 +143,7 @@ fn auto_learns_the_wire_from_a_refusal() {
 }
 
 #[test]
-fn a_stream_without_a_count_of_tokens_is_asked_again_without_it() {
+fn stream_without_usage_is_repeated() {
     let refusal = Answer::error(
         400,
         "unknown_parameter",
@@ -160,7 +160,7 @@ fn a_stream_without_a_count_of_tokens_is_asked_again_without_it() {
 }
 
 #[test]
-fn a_stream_that_breaks_off_is_asked_again() {
+fn broken_stream_is_asked_again() {
     let piece = delta(&json!({"content": "A"}), None);
     let error = r#"{"error":{"message":"overloaded","code":529}}"#;
     let broken = [
@@ -183,7 +183,7 @@ fn a_stream_that_breaks_off_is_asked_again() {
 
 /// The timeout of a stream is for its silence, that of a whole reply for all of it.
 #[test]
-fn a_stream_may_take_longer_than_the_timeout_but_not_be_silent() {
+fn stream_may_outlast_timeout_unless_silent() {
     let impatient = Sending {
         timeout: Duration::from_millis(300),
         retries: 0,
@@ -209,7 +209,7 @@ fn a_stream_may_take_longer_than_the_timeout_but_not_be_silent() {
 
 /// The key of these tests, as a server might repeat it in a field that is kept; shortening must not leave half of it.
 #[test]
-fn a_key_in_the_reason_to_stop_is_removed() {
+fn finish_reason_hides_keys() {
     let key = "sk-0123456789abcdef";
     for before in ["", "a reason that is just so long, ", "ab\u{7}"] {
         let reason = format!("{before}{key}");

@@ -19,7 +19,7 @@ fn under(gain: f64, drift: f32) -> Value {
 /// 25 %: without compensation, 3 % more light makes neighbours correlate by more than is allowed at both gains, and 4.9 % makes K
 /// 7 % too large at the lower one.
 #[test]
-fn a_drifting_lamp_leaves_gain_as_it_is() {
+fn drifting_lamp_keeps_gain() {
     check_rows([0.0939, 0.7513], |gain| {
         let steady = under(gain, 0.0);
         assert_eq!(steady["warnings"], Value::Array(Vec::new()));

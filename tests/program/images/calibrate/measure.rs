@@ -76,7 +76,7 @@ fn row(camera: &str, gain: f64, bias: usize, pairs: usize) {
 /// A recording of seven settings of the default size, and one setting of 24 megapixels.
 #[test]
 #[ignore = "measures"]
-fn times() {
+fn calibration_time_by_size() {
     let bench = Bench::new();
     for index in 0..7 {
         let gain = 0.0939 * f64::from(1 << index);

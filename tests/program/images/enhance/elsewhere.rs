@@ -7,6 +7,7 @@ use image::{DynamicImage, ImageBuffer, Rgb};
 use serde_json::Value;
 
 use crate::support::run::{Bench, Called, words};
+use crate::support::snapshot::redacted;
 
 const ASK: &str = "--model random --data rooms --levels L3,L5 --variant noise";
 
@@ -65,14 +66,15 @@ fn refused(bench: &Bench, flags: &str, expected: &[&str]) {
 }
 
 #[test]
-fn images_of_a_folder_are_a_condition_like_those_of_an_enhancer() {
+fn enhanced_folder_is_a_condition() {
     let bench = bench();
     let called = ask(&bench, "--enhanced mine=made --out run");
-    assert_eq!(called.code, Some(0), "{called:?}");
-    assert!(
-        called.stderr.contains("8 of 24 images are not used"),
-        "{called:?}"
-    );
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 0
+     WARN made: 8 of 24 images are not used, because no question is about their frames or conditions:
+        bathroom-0000/eye_L0.png, bathroom-0000/robot_L0.png, bedroom-0000/eye_L0.png, bedroom-0000/robot_L0.png
+        and 4 more
+    ");
     let text = fs::read_to_string(bench.path("run/manifest.json")).unwrap();
     let manifest: Value = serde_json::from_str(&text).unwrap();
     let judged = &manifest["enhancers"]["mine"]["judged"]["images"];
@@ -86,7 +88,19 @@ fn images_of_a_folder_are_a_condition_like_those_of_an_enhancer() {
     let first: Value = serde_json::from_str(questions.lines().next().unwrap()).unwrap();
     let id = first["id"].as_str().unwrap();
     let shown = bench.complete(&["show", "run", id, "--condition", "L3-noise+mine"]);
-    assert!(shown.contains("the same bytes"), "{shown}");
+    insta::assert_snapshot!(redacted(&shown), @r#"
+    room_type-8cc29bfffd957388, about bathroom-0000/eye
+    What type of room is this?
+      A. bedroom
+      B. bathroom  (true)
+      C. kitchen
+      D. living room
+      E. dining room
+      F. office
+    L3-noise+mine: run/shown/bathroom-0000/eye_L3-noise+mine.png
+    L3-noise+mine: the same bytes as were sent ([DIGEST])
+      random: ✗ wrong: "F"
+    "#);
     let sent = images(&bench.path("run/shown"), "+mine")[0].clone();
     let made = images(&bench.path("made"), "L3-noise");
     let pixels = |path: &Path| image::open(path).unwrap().into_rgb8();
@@ -103,15 +117,18 @@ fn images_of_a_folder_are_a_condition_like_those_of_an_enhancer() {
         .save(&changed)
         .unwrap();
     let called = ask(&bench, "--enhanced mine=moved --resume run");
-    assert_eq!(called.code, Some(2), "{called:?}");
-    assert!(
-        called.stderr.contains("mine has another --enhanced"),
-        "{called:?}"
-    );
+    insta::assert_snapshot!(called.messages(), @r#"
+    exit code: 2
+     WARN moved: 8 of 24 images are not used, because no question is about their frames or conditions:
+        bathroom-0000/eye_L0.png, bathroom-0000/robot_L0.png, bedroom-0000/eye_L0.png, bedroom-0000/robot_L0.png
+        and 4 more
+    error: run: the enhancer mine has another --enhanced in this run: it was "[DIGEST]", now it is "[DIGEST]"; use
+        another --out, or the same --enhanced
+    "#);
 }
 
 #[test]
-fn parts_of_a_run_share_a_folder() {
+fn parts_of_run_share_folder() {
     let bench = bench();
     for part in ["1/2", "2/2"] {
         bench.complete(&words(&format!(
@@ -156,7 +173,7 @@ fn each_unusable_image_is_named() {
 }
 
 #[test]
-fn images_of_other_dark_images_are_refused() {
+fn images_of_other_sources_are_refused() {
     let bench = bench();
     let enhanced = "--enhanced mine=made";
     for (flags, expected) in [
@@ -184,9 +201,13 @@ fn images_of_other_dark_images_are_refused() {
         fs::write(path, &bytes[(place + 5) % bytes.len()]).unwrap();
     }
     let called = ask(&bench, "--enhanced mine=made --out run");
-    assert_eq!(called.code, Some(2), "{called:?}");
-    assert!(
-        called.stderr.contains("the name of its own dark image"),
-        "{called:?}"
-    );
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 2
+     WARN made: 8 of 24 images are not used, because no question is about their frames or conditions:
+        bathroom-0000/eye_L0.png, bathroom-0000/robot_L0.png, bedroom-0000/eye_L0.png, bedroom-0000/robot_L0.png
+        and 4 more
+    error: made: 5 of its 6 images of dark frames are implausible; they have edges that are not those of the
+        frames (-0.01 of the edges agree, 1 at best); check that each has the name of its own dark image; --allow
+        bad-enhancer uses them anyway
+    ");
 }

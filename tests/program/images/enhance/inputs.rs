@@ -8,11 +8,12 @@ use darkqa_ground::types::Rgb;
 use super::{fault, image, map, open, runtime, stated};
 use crate::support::onnx::{self, Graph, Size, Type};
 use crate::support::run::{Bench, words};
+use crate::support::snapshot::redacted;
 use crate::support::table::check_rows;
 
 const ANY: Size = Size::Named("any");
 
-/// What is wrong with a model and its sidecar.
+/// The error of a model with a sidecar.
 fn fault_of(graph: &Graph, sidecar: &str) -> String {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("model.onnx.toml"), sidecar).unwrap();
@@ -79,7 +80,7 @@ fn numbers_of_each_type_are_given() {
 }
 
 #[test]
-fn a_number_that_does_not_fit_is_refused_with_its_type() {
+fn unsuitable_number_names_its_type() {
     let one = [Size::Known(1)];
     let rows = [
         (Type::Int, "3.5", "3.5 does not fit its type int32"),
@@ -101,7 +102,7 @@ fn a_number_that_does_not_fit_is_refused_with_its_type() {
 }
 
 #[test]
-fn a_map_and_an_expression_have_the_images_size() {
+fn map_and_expression_have_images_size() {
     let image = image(12, 20);
     let graph = onnx::times_plane("factor");
     let found = enhanced(&graph, "[extra]\nfactor = { map = 0.5 }", &image);
@@ -117,15 +118,24 @@ fn a_map_and_an_expression_have_the_images_size() {
     });
     assert_near(&found, &expected);
     let message = fault_of(&graph, "[extra]\nfactor = 0.5");
-    assert!(message.contains("`factor = { map = 0.5 }`"), "{message}");
+    insta::assert_snapshot!(redacted(&message), @r#"
+    [TMP]/model.onnx: takes "factor" (float32 [1, 1, height, width]); model.onnx.toml or the preset sets it to
+        0.5, but it has the image's size; `factor = { map = 0.5 }` gives every pixel this number
+    "#);
     let message = fault_of(&graph, "[extra]\nfactor = { from = \"image\" }");
-    assert!(message.contains("mean(…)"), "{message}");
+    insta::assert_snapshot!(redacted(&message), @r#"
+    [TMP]/model.onnx: takes "factor" (float32 [1, 1, height, width]); model.onnx.toml or the preset sets it to
+        from image, but this has three channels, and it takes one; wrap the expression in mean(…) or max(…)
+    "#);
     let message = fault_of(&graph, "[extra]\nfactor = { from = \"output\" }");
-    assert!(message.contains("the names are `image`"), "{message}");
+    insta::assert_snapshot!(redacted(&message), @r#"
+    [TMP]/model.onnx.toml: extra.factor.from = "output" names `output`, which is unknown; the names are `image`;
+        all keys: https://github.com/darkqa-eval/darkqa-eval/blob/main/src/docs/enhancers.md
+    "#);
 }
 
 #[test]
-fn noise_is_the_same_with_any_tiles_and_threads() {
+fn noise_ignores_tiles_and_threads() {
     let image = image(40, 60);
     let graph = onnx::plus_noise();
     let noise = |std: f64, seed: u64| {
@@ -158,7 +168,7 @@ fn noise_is_the_same_with_any_tiles_and_threads() {
 }
 
 #[test]
-fn noise_of_another_size_is_not_cut_into_tiles() {
+fn noise_of_other_size_is_untiled() {
     let image = image(40, 60);
     let sidecar = "tile = \"exact:2\"\n[extra]\nz = { noise = \"normal\", std = 0, divide = 8 }";
     let (_folder, enhancer) = stated(&onnx::plus_mean_of_noise(), sidecar);
@@ -166,15 +176,21 @@ fn noise_of_another_size_is_not_cut_into_tiles() {
     assert_eq!(enhancer.enhance(&image).unwrap(), image);
     let mut enhancer = enhancer.with_tiling(Tiling::Side(NonZeroUsize::new(32).unwrap()));
     let message = enhancer.enhance(&image).unwrap_err().to_string();
-    assert!(message.contains("cannot be cut into tiles"), "{message}");
+    insta::assert_snapshot!(redacted(&message), @r#"
+    [TMP]/model.onnx: takes noise of the image's size divided by 8 ("z"), which cannot be cut into tiles; leave
+        out --llie-options tile, or enhance images of a size that the model takes
+    "#);
 }
 
 #[test]
-fn a_model_of_the_luma_keeps_the_chroma() {
+fn model_of_luma_keeps_chroma() {
     let image = image(12, 20);
     let graph = onnx::luma_gain(1.5);
     let message = fault(&graph);
-    assert!(message.contains("`channels = \"y\"`"), "{message}");
+    insta::assert_snapshot!(redacted(&message), @r#"
+    [TMP]/model.onnx: takes "input" (float32 [1, 1, height, width]), an image of one channel; if that is the luma,
+        add to model.onnx.toml next to it: `channels = "y"`
+    "#);
     let expected = map_pixels(&image, |[red, green, blue]| {
         let luma = 0.299 * red + 0.587 * green + 0.114 * blue;
         [red, green, blue].map(|x| x + 0.5 * luma)
@@ -190,7 +206,7 @@ fn a_model_of_the_luma_keeps_the_chroma() {
 }
 
 #[test]
-fn the_image_is_composed_of_outputs_by_their_names() {
+fn outputs_compose_image_by_name() {
     let image = image(12, 20);
     let graph = onnx::light_and_reflectance();
     let light = |pixel: [f64; 3]| pixel.into_iter().fold(1e-3, f64::max);
@@ -209,14 +225,14 @@ fn the_image_is_composed_of_outputs_by_their_names() {
     assert_eq!(preset("pairlie"), enhanced(&graph, &truncated, &image));
     assert_ne!(preset("pairlie"), preset("pairlie-lol"));
     let message = fault_of(&graph, "image = \"L * Q\"");
-    assert!(
-        message.contains("names `Q`") && message.contains("the names are `L`, `R`, `input`"),
-        "{message}"
-    );
+    insta::assert_snapshot!(redacted(&message), @r#"
+    [TMP]/model.onnx: image = "L * Q" names `Q`, which is unknown; the names are `L`, `R`, `input`; outputs: "L"
+        (float32 [1, 1, height, width]), "R" (float32 [1, 3, height, width])
+    "#);
 }
 
 #[test]
-fn what_is_fed_and_read_are_expressions() {
+fn inputs_and_outputs_are_expressions() {
     let image = image(12, 20);
     let rows = [
         (onnx::identity(), "input = \"1 - image\""),
@@ -239,7 +255,7 @@ fn what_is_fed_and_read_are_expressions() {
 }
 
 #[test]
-fn what_is_not_finite_is_an_error() {
+fn what_is_not_finite_is_error() {
     let rows = [
         ("input = \"image / 0\"", "values that are not finite"),
         ("image = \"output / 0\"", "not numbers"),
@@ -252,7 +268,7 @@ fn what_is_not_finite_is_an_error() {
 }
 
 #[test]
-fn what_a_sidecar_lacks_is_named_with_its_lines() {
+fn missing_sidecar_lines_are_named() {
     let one = [Size::Known(1)];
     let rows = [
         (
@@ -291,7 +307,7 @@ fn what_a_sidecar_lacks_is_named_with_its_lines() {
 }
 
 #[test]
-fn a_sidecar_that_contradicts_itself_is_refused() {
+fn sidecar_that_contradicts_itself_is_refused() {
     let rows = [
         ("output = \"output\"\nimage = \"output\"", "delete `output`"),
         ("channels = \"y\"", "delete that line"),
@@ -304,7 +320,7 @@ fn a_sidecar_that_contradicts_itself_is_refused() {
 }
 
 #[test]
-fn the_command_takes_what_a_sidecar_composes() {
+fn command_takes_what_sidecar_composes() {
     let bench = Bench::new();
     onnx::light_and_reflectance().write(&bench.path(""), "pair.onnx");
     bench.file("pair.onnx.toml", "image = \"L ^ 0.2 * R\"");

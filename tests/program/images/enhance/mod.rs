@@ -14,6 +14,7 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use crate::support::onnx::{self, Graph};
+use crate::support::snapshot::redacted;
 use darkqa_enhance::{Enhancer, Install, ModelFile, Runtime, RuntimeSearch};
 use darkqa_ground::types::Rgb;
 use tempfile::TempDir;
@@ -46,7 +47,7 @@ fn stated(graph: &Graph, sidecar: &str) -> (TempDir, Enhancer) {
     (folder, enhancer)
 }
 
-/// What is wrong with a model.
+/// The error of a model.
 fn fault(graph: &Graph) -> String {
     let folder = tempfile::tempdir().unwrap();
     let path = graph.write(folder.path(), "model.onnx");
@@ -84,14 +85,15 @@ fn the_runtime_is_opened_once() {
         install: Install::Offline,
     };
     let message = other.open().err().unwrap().to_string();
-    assert!(
-        message.contains("this process has already loaded"),
-        "{message}"
-    );
+    insta::assert_snapshot!(redacted(&message), @"
+    ONNX Runtime: [TMP]/other.so cannot be loaded, because this process has already loaded
+        /root/.cache/darkqa-eval/onnxruntime/1.31.1/libonnxruntime.so.1.31.1; name a library of 1.17 or later with
+        --llie-options ort-lib=FILE or ORT_DYLIB_PATH, or leave both out to search for one
+    ");
 }
 
 #[test]
-fn threads_and_enhancers_do_not_disturb_each_other() {
+fn enhancers_run_in_parallel_independently() {
     let image = image(9, 14);
     std::thread::scope(|scope| {
         for factor in [1.0_f32, 2.0, 3.0, 4.0] {
@@ -108,7 +110,7 @@ fn threads_and_enhancers_do_not_disturb_each_other() {
 }
 
 #[test]
-fn the_callers_arithmetic_keeps_its_subnormal_numbers() {
+fn callers_arithmetic_keeps_its_subnormal_numbers() {
     let (_folder, mut enhancer) = loaded(&onnx::identity());
     enhancer.enhance(&image(4, 4)).unwrap();
     let half = std::hint::black_box(f32::MIN_POSITIVE) / std::hint::black_box(2.0);

@@ -19,7 +19,7 @@ fn shipped() -> PathBuf {
 
 /// `DARKQA_BLESS=1 cargo test --test program enhance::` writes the file anew.
 #[test]
-fn the_shipped_enhancer_is_what_the_writer_makes() {
+fn shipped_enhancer_is_what_writer_makes() {
     let model = onnx::gray_gain().model();
     if std::env::var_os("DARKQA_BLESS").is_some_and(|value| value == "1") {
         std::fs::write(shipped(), &model).unwrap();
@@ -73,7 +73,7 @@ fn psnr(a: &Rgb, b: &Rgb) -> f64 {
 }
 
 #[test]
-fn the_trained_enhancer_brings_a_room_back() {
+fn trained_enhancer_brings_room_back() {
     let mut enhancer = lift();
     let rooms = Rooms {
         frames: 6,
@@ -104,7 +104,7 @@ fn the_trained_enhancer_brings_a_room_back() {
     }
 }
 
-/// What is flat stays flat, what is empty stays empty, and no edge comes up where there was none.
+/// Flat areas stay flat, empty ones stay empty, and no new edges appear.
 #[test]
 fn the_trained_enhancer_invents_nothing() {
     let mut enhancer = lift();

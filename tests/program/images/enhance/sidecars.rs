@@ -7,12 +7,18 @@ use darkqa_ground::types::Rgb;
 
 use super::{fault, image, loaded, map, open, stated};
 use crate::support::onnx;
+use crate::support::snapshot::redacted;
 use crate::support::table::check_rows;
 
 #[test]
-fn a_sidecar_says_which_output_it_is() {
+fn sidecar_says_which_output_it_is() {
     let graph = onnx::two_outputs();
-    assert!(fault(&graph).contains("several outputs"));
+    insta::assert_snapshot!(redacted(&fault(&graph)), @r#"
+    [TMP]/model.onnx: has several outputs that could be the image: "17" (float32 [1, 3, height, width]), "18"
+        (float32 [1, 3, height, width]); add to model.onnx.toml next to it: `output = "NAME"` or `output = INDEX`
+        (from 0); presets with such outputs: darkir, sci, zero-dce++ (--llie PRESET:FILE); `darkqa-eval enhance
+        doctor` shows which are plausible
+    "#);
     let folder = tempfile::tempdir().unwrap();
     let path = graph.write(folder.path(), "model.onnx");
     let sidecar = folder.path().join("model.onnx.toml");
@@ -24,11 +30,14 @@ fn a_sidecar_says_which_output_it_is() {
     });
     std::fs::write(&sidecar, "output = 1\nlayout_in = \"nhwc\"").unwrap();
     let message = open(&path).err().unwrap().to_string();
-    assert!(message.contains("layout_in"), "{message}");
+    insta::assert_snapshot!(redacted(&message), @r#"
+    [TMP]/model.onnx: takes "input" (float32 [1, 3, height, width]), which does not fit `layout_in` in
+        model.onnx.toml or the preset; correct or delete that line
+    "#);
 }
 
 #[test]
-fn a_sidecar_says_what_a_graph_cannot() {
+fn sidecar_says_what_graph_cannot() {
     let image = image(12, 20);
     let rows = [
         (
@@ -62,7 +71,7 @@ fn a_sidecar_says_what_a_graph_cannot() {
 }
 
 #[test]
-fn a_range_that_nobody_stated_is_checked() {
+fn range_that_nobody_stated_is_checked() {
     let rows = [
         (onnx::ranged(0.0, 255.0), "seems to be 0..255"),
         (onnx::ranged(-1.0, 1.0), "seems to be -1..1"),
@@ -75,7 +84,7 @@ fn a_range_that_nobody_stated_is_checked() {
 }
 
 #[test]
-fn a_preset_says_what_its_authors_do() {
+fn preset_says_what_its_authors_do() {
     let folder = tempfile::tempdir().unwrap();
     let path = onnx::two_outputs().write(folder.path(), "model.onnx");
     let image = image(8, 8);
@@ -88,10 +97,12 @@ fn a_preset_says_what_its_authors_do() {
         assert_eq!(enhanced.unwrap(), expected.unwrap(), "{preset}");
     }
     let message = open(&file("zero-dce")).err().unwrap().to_string();
-    assert!(
-        message.contains("outputs of 3, 3, 24 channels"),
-        "{message}"
-    );
+    insta::assert_snapshot!(redacted(&message), @r#"
+    [TMP]/model.onnx: does not match preset zero-dce: expected an image named enhance_image or enhanced or output;
+        or outputs of 3, 3, 24 channels; or outputs of 3, 24 channels, found "17" (float32 [1, 3, height, width]),
+        "18" (float32 [1, 3, height, width]); add to model.onnx.toml next to it the one that is the image: `output
+        = "NAME"`
+    "#);
     for names in [
         ["1", "2", "3"],
         ["output", "7", "8"],
@@ -111,10 +122,11 @@ fn a_preset_says_what_its_authors_do() {
         ["sci", "zero-dce"].map(|preset| ModelFile::read(&file(preset)).unwrap().digest());
     assert_ne!(digests[0], digests[1]);
     let message = open(&file("nonesuch")).err().unwrap().to_string();
-    assert!(
-        message.contains("is not a preset; the presets are"),
-        "{message}"
-    );
+    insta::assert_snapshot!(redacted(&message), @r#"
+    --llie: "nonesuch" before the colon is not a preset; the presets are agllnet, cidnet, darkir, enlightengan,
+        iat, kind, llformer, mirnet, pairlie, pairlie-lol, restormer, retinexformer, ruas-dark, ruas-lol,
+        ruas-upe, sci, uretinex, zero-dce, zero-dce++, zero-dce-tf
+    "#);
     for (typed, meant) in [("zerodce", "zero-dce"), ("ruas", "ruas-lol")] {
         let message = open(&file(typed)).err().unwrap().to_string();
         let question = format!("; did you mean {meant}?");

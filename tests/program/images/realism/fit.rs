@@ -2,6 +2,7 @@
 
 use super::rows::{column, csv};
 use super::*;
+use crate::support::snapshot::lines_with;
 
 const FIXED: [&str; 3] = ["--variant", "noise", "--fixed"];
 
@@ -21,7 +22,7 @@ fn fits<'s>(summary: &'s Value, reading: &str) -> &'s [Value] {
 }
 
 #[test]
-fn a_known_gain_comes_back_in_every_light_reading() {
+fn known_gain_fits_every_profile() {
     check_rows(["paper", "eld", "level", "physical"], |reading| {
         let bench = Bench::new();
         for (name, gain) in [("weak", "0.2"), ("middle", "0.7746"), ("strong", "3")] {
@@ -48,7 +49,7 @@ fn a_known_gain_comes_back_in_every_light_reading() {
 
 /// A picture that holds linear light is fitted as light, as it is compared: its noise is not that of a picture of its codes.
 #[test]
-fn a_known_gain_comes_back_from_linear_light() {
+fn known_gain_fits_linear_light() {
     let bench = Bench::new();
     for side in ["normal", "low"] {
         fs::create_dir_all(bench.path(&format!("pairs/{side}"))).unwrap();
@@ -85,7 +86,7 @@ fn a_known_gain_comes_back_from_linear_light() {
 
 /// A picture without noise, and one whose noise was averaged away: the one has no gain, the other a smaller one.
 #[test]
-fn what_is_not_the_noise_of_a_sensor_is_not_fitted() {
+fn foreign_noise_is_not_fitted() {
     let bench = Bench::new();
     made_pairs(&bench, "pairs", &[("bare", 4)], &["--variant", "ev"]);
     let loud = [&FIXED[..], &["--gain", "3", "--profile", "physical"]].concat();
@@ -109,11 +110,10 @@ fn what_is_not_the_noise_of_a_sensor_is_not_fitted() {
         "out",
     ];
     let table = bench.complete(&[&["realism", "pairs"], &arguments[..]].concat());
-    assert!(
-        table
-            .contains("as saved; a smaller K than the sensor's means that noise was averaged away"),
-        "{table}"
-    );
+    insta::assert_snapshot!(lines_with(&table, "smaller K"), @"
+    System gain K by the spread of smooth blocks, as saved; a smaller K than the sensor's means that noise was
+        averaged away
+    ");
     let refused = "bare, physical: K 0.02, misfit";
     assert!(table.contains(refused), "{table}");
     let reason = "no fit, as the ladder of K ends here: the low image's noise is not a sensor's under this reading";
@@ -129,7 +129,11 @@ fn what_is_not_the_noise_of_a_sensor_is_not_fitted() {
     let none = bench.call(&words);
     assert_eq!(none.code, Some(0), "{none:?}");
     assert!(!bench.path("none/fitted.toml").exists());
-    assert!(none.stderr.contains("fitted.toml: not written"), "{none:?}");
+    insta::assert_snapshot!(none.messages(), @"
+    exit code: 0
+     WARN pairs/normal/averaged.png: no partner in the other light
+     WARN none/fitted.toml: not written, because no pair is fitted under paper
+    ");
     assert!(!none.stdout.contains("gain fitted"), "{}", none.stdout);
 }
 
@@ -156,7 +160,7 @@ fn of_pair(bench: &Bench, file: &str, pair: &str, camera: &str) -> Vec<String> {
 
 /// With three fitted pairs, a pair is judged by the camera that the other two alone give; not by one that knows its own gain.
 #[test]
-fn no_pair_is_judged_by_its_own_gain() {
+fn pairs_are_judged_by_others_gain() {
     let bench = Bench::new();
     let others = [("one", 4), ("two", 5)];
     unequal_pairs(&bench, "others", &others);
@@ -165,15 +169,21 @@ fn no_pair_is_judged_by_its_own_gain() {
         bench.complete(&[&["realism", folder, "--out", out], &FIT[..]].concat())
     };
     let marked = fit("others", "two");
-    assert!(
-        marked.contains("physical, gain fitted to the same pairs"),
-        "{marked}"
-    );
+    insta::assert_snapshot!(lines_with(&marked, "gain fitted"), @"
+     with sensor noise, physical, gain fitted to the same pairs   40.69     0.9347   0.001    0.0          0.001
+     physical, gain fitted to the same pairs   +0.91     −0.0119   −11.513       2
+    one: with noise, physical, gain fitted to the same pairs: PSNR 40.56 SSIM 0.9327 D_KL 0.002
+    two: with noise, physical, gain fitted to the same pairs: PSNR 40.83 SSIM 0.9366 D_KL 0.000
+    ");
     let table = fit("pairs", "three");
-    assert!(
-        table.contains("physical, gain fitted to the other pairs"),
-        "{table}"
-    );
+    insta::assert_snapshot!(lines_with(&table, "gain fitted"), @"
+     with sensor noise, physical, gain fitted to the other pairs   33.18 ±6.58    0.7240 ±0.2830   0.703 ±1.271
+        0.0 ±0.0     0.703 ±1.271
+     physical, gain fitted to the other pairs   −3.46 ±7.89   −0.1076 ±0.2572   −11.588 ±2.113       3
+    loud: with noise, physical, gain fitted to the other pairs: PSNR 30.44 SSIM 0.6029 D_KL 1.283
+    one: with noise, physical, gain fitted to the other pairs: PSNR 35.73 SSIM 0.8290 D_KL 0.313
+    two: with noise, physical, gain fitted to the other pairs: PSNR 33.37 SSIM 0.7401 D_KL 0.514
+    ");
     let judged = of_pair(&bench, "three/pairs.csv", "loud", "other-pairs");
     for (camera, is_same) in [("two/fitted.toml", true), ("three/fitted.toml", false)] {
         let words = ["realism", "pairs", "--ev", "4", "--profile", "physical"];
@@ -184,7 +194,7 @@ fn no_pair_is_judged_by_its_own_gain() {
 }
 
 #[test]
-fn the_fitted_camera_is_read_again_and_gives_the_same_numbers() {
+fn fitted_camera_reproduces_numbers() {
     let bench = Bench::new();
     unequal_pairs(&bench, "pairs", &[("one", 4), ("loud", 5)]);
     let fit = [
@@ -230,7 +240,7 @@ fn the_fitted_camera_is_read_again_and_gives_the_same_numbers() {
 }
 
 #[test]
-fn fits_do_not_depend_on_threads_but_on_the_seed() {
+fn fits_depend_only_on_seed() {
     let bench = Bench::new();
     unequal_pairs(&bench, "pairs", &[("one", 4), ("loud", 5)]);
     let fit = |words: &[&str]| json(&bench, &[&["--fit", "--profile", "all"], words].concat());
@@ -247,13 +257,18 @@ fn fits_do_not_depend_on_threads_but_on_the_seed() {
 }
 
 #[test]
-fn a_gain_is_not_both_pinned_and_fitted() {
+fn gain_is_pinned_or_fitted() {
     let bench = Bench::new();
     pair(&bench, "a", 1);
     let refused = bench.call(&["realism", "pairs", "--fit", "--gain", "1"]);
-    assert_eq!(refused.code, Some(2), "{refused:?}");
-    assert!(refused.stderr.contains("--noise gain"), "{refused:?}");
+    insta::assert_snapshot!(refused.messages(), @"
+    exit code: 2
+    error: the argument '--fit' cannot be used with '--noise gain=<K>'
+    ");
     // 96 blocks of 8 × 8 pixels are 12 in a bin.
     let few = bench.complete(&["realism", "pairs", "--fit"]);
-    assert!(few.contains("a, paper: no fit: too few blocks"), "{few}");
+    insta::assert_snapshot!(
+        lines_with(&few, "no fit"),
+        @"a, paper: no fit: too few blocks of 8 × 8 pixels are smooth, and neither black nor white"
+    );
 }

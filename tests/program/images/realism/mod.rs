@@ -7,7 +7,8 @@ mod rows;
 
 use std::fs;
 
-use crate::support::run::Bench;
+use crate::support::run::{Bench, words};
+use crate::support::snapshot::each;
 use crate::support::table::check_rows;
 use image::{Rgb, RgbImage};
 use serde_json::Value;
@@ -94,7 +95,7 @@ fn json(bench: &Bench, words: &[&str]) -> Value {
 }
 
 #[test]
-fn noise_is_nearer_to_noise_than_its_absence() {
+fn noise_resembles_noise() {
     let bench = Bench::new();
     for (salt, name) in ["a", "b", "c"].into_iter().enumerate() {
         pair(&bench, name, salt as u32);
@@ -128,12 +129,10 @@ fn files_hold_every_pair() {
     )
     .unwrap();
     let table = bench.call(&["realism", "pairs", "--out", "out"]);
-    assert_eq!(table.code, Some(0), "{table:?}");
-    assert!(
-        table.stderr.contains("stray.png: no partner"),
-        "{}",
-        table.stderr
-    );
+    insta::assert_snapshot!(table.messages(), @"
+    exit code: 0
+     WARN pairs/low/stray.png: no partner in the other light
+    ");
     let rows = [
         "exposure drop alone",
         "with sensor noise",
@@ -169,15 +168,22 @@ fn equal_images_are_told_as_such() {
     )
     .unwrap();
     let table = bench.call(&["realism", "pairs", "--ev", "0"]);
-    assert!(table.stdout.contains('∞'), "{}", table.stdout);
-    assert!(table.stderr.contains("--ev 0: below 0.5 EV"), "{table:?}");
+    insta::assert_snapshot!(table.lines_with("∞"), @"
+    exit code: 0
+     exposure drop alone        ∞         1.0000   0.000   0.0          0.000
+     paper                         −∞        −0.5639   +5.268       1
+    ");
+    insta::assert_snapshot!(table.messages(), @"
+    exit code: 0
+     WARN --ev 0: below 0.5 EV both images have nearly the same light
+    ");
     let summary = json(&bench, &["--ev", "0"]);
     assert_eq!(summary["exposure"]["psnr"]["value"], Value::Null);
     assert!(summary["exposure"]["kl"]["value"].as_f64().unwrap().abs() < 1e-9);
 }
 
 #[test]
-fn a_broken_pair_does_not_stop_the_others() {
+fn broken_pair_does_not_stop_others() {
     let bench = Bench::new();
     pair(&bench, "a", 1);
     pair(&bench, "b", 2);
@@ -185,36 +191,42 @@ fn a_broken_pair_does_not_stop_the_others() {
         .save(bench.path("pairs/low/b.png"))
         .unwrap();
     let called = bench.call(&["realism", "pairs"]);
-    assert_eq!(called.code, Some(1), "{called:?}");
-    assert!(
-        called.stderr.contains("b: ") && called.stderr.contains("20 × 20"),
-        "{}",
-        called.stderr
-    );
-    assert!(called.stdout.contains("1 pair failed"));
-    let rows = [
-        (&["realism", "nowhere"][..], "nowhere"),
-        (&["realism", "pairs/low"], "--normal DIR"),
-        (&["realism", "pairs", "--ev", "99"], "--ev"),
-        (
-            &["realism", "pairs", "--kl-bins", "two"],
-            "'--kl-bins <KL_BINS>' [possible values: fu, kousha]",
-        ),
-        (&["realism"], "PAIRS"),
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 1
+    ERROR b: pair: 96 × 64 pixels against 20 × 20; both images of a pair must have the same size
+    ");
+    insta::assert_snapshot!(called.lines_with("pair failed"), @"
+    exit code: 1
+    1 pair failed
+    ");
+    let calls = [
+        "realism nowhere",
+        "realism pairs/low",
+        "realism pairs --ev 99",
+        "realism pairs --kl-bins two",
+        "realism",
     ];
-    check_rows(rows, |(args, message)| {
-        let refused = bench.call(args);
-        assert_eq!(refused.code, Some(2), "{args:?}: {refused:?}");
-        assert_eq!(
-            refused.stderr.trim_end().lines().count(),
-            1,
-            "{}",
-            refused.stderr
-        );
-        assert!(
-            refused.stderr.contains(message),
-            "{args:?}: {}",
-            refused.stderr
-        );
+    let errors = each(calls, |call| {
+        let refused = bench.call(&words(call));
+        assert_eq!(refused.stderr.trim_end().lines().count(), 1, "{refused:?}");
+        refused.messages()
     });
+    insta::assert_snapshot!(errors, @"
+    realism nowhere
+      exit code: 2
+      error: nowhere: cannot read: [OS ERROR]
+    realism pairs/low
+      exit code: 2
+      error: pairs/low: no pairs in it; expected are folders normal and low (or high and low, val_rgb_h and
+          val_rgb_l), or files like normal1.png and low1.png; --normal DIR and --low DIR name any two folders
+    realism pairs --ev 99
+      exit code: 2
+      error: invalid value '99' for '--ev <EV>': a number from -20 to 20 expected
+    realism pairs --kl-bins two
+      exit code: 2
+      error: invalid value 'two' for '--kl-bins <KL_BINS>' [possible values: fu, kousha]
+    realism
+      exit code: 2
+      error: the following required arguments were not provided: <PAIRS>
+    ");
 }

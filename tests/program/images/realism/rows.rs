@@ -21,7 +21,7 @@ pub(super) fn column(rows: &[Vec<String>], name: &str) -> Vec<String> {
 }
 
 #[test]
-fn differences_are_paired_and_have_no_interval_below_three_pairs() {
+fn intervals_need_three_paired_differences() {
     let bench = Bench::new();
     for (count, name) in ["a", "b", "c"].into_iter().enumerate() {
         pair(&bench, name, count as u32);
@@ -60,7 +60,7 @@ fn differences_are_paired_and_have_no_interval_below_three_pairs() {
 
 /// The interval is that of the differences: it is not made of the intervals of the two rows.
 #[test]
-fn the_interval_of_a_difference_is_students() {
+fn interval_of_difference_is_students() {
     let bench = Bench::new();
     for (salt, name) in ["a", "b", "c"].into_iter().enumerate() {
         pair(&bench, name, salt as u32);

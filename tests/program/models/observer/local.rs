@@ -131,7 +131,7 @@ impl Ink {
     }
 }
 
-/// What a change leaves of the things that it does not touch.
+/// Detection of unchanged objects after a local change.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Elsewhere {
     /// Expected score of the questions about untouched things alone, without the change and with it.
@@ -178,7 +178,7 @@ impl Elsewhere {
     }
 }
 
-/// The segments of which no pixel is changed.
+/// Segments without a changed pixel.
 fn untouched(asked: &Asked, changed: &Rgb) -> BTreeSet<u32> {
     let mut segments: BTreeSet<u32> = asked.segments.iter().copied().collect();
     let pixels = asked

@@ -36,7 +36,7 @@ pub(super) struct Set {
     pub(super) palette: Palette,
 }
 
-/// What the observer makes of one image of each frame.
+/// Observations of one image of each frame.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Outcome {
     /// Expected score with its 95 % interval by frame: the 2.5 % and 97.5 % quantiles of 2,000 resamples.
@@ -109,7 +109,7 @@ impl Set {
         &self.frames[other.unwrap()]
     }
 
-    /// What the observer makes of an image of each frame.
+    /// Observations of an image of each frame.
     pub(super) fn look(&self, image: impl Fn(usize, &Asked) -> Rgb + Sync) -> Outcome {
         self.judged(image, |asked, seen, question| {
             let _ = asked;

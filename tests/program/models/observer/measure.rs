@@ -92,7 +92,7 @@ fn the_share_of_the_outline() {
 /// 96 frames: all views of 48 rooms.
 #[test]
 #[ignore = "measures"]
-fn local_changes() {
+fn local_changes_match_reference() {
     let rooms = Rooms {
         frames: 96,
         seed: 7,

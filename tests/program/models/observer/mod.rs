@@ -64,7 +64,7 @@ fn without_the_right_image_it_guesses() {
 
 /// The rule of an observer that answers from the labels wherever there is any contrast fails the same test.
 #[test]
-fn an_observer_that_trusts_the_labels_is_found_out() {
+fn label_trusting_observer_is_found() {
     let set = &*SMALL;
     let by_labels = |control: Control| -> Outcome {
         set.judged(
@@ -83,7 +83,7 @@ fn an_observer_that_trusts_the_labels_is_found_out() {
 }
 
 #[test]
-fn a_tone_curve_and_a_gain_change_no_answer() {
+fn tone_and_gain_keep_answers() {
     let set = &*SMALL;
     let clean = set.look(|_, asked| asked.image.clone());
     assert!(clean.score.value >= 0.97, "{clean:?}");
@@ -166,7 +166,7 @@ fn uneven_light_hides_little() {
 }
 
 #[test]
-fn local_changes_of_another_room_show_nothing() {
+fn foreign_local_changes_show_nothing() {
     let set = &*SMALL;
     check_rows(CHANGES, |change| {
         let image = |place: usize, _: &Asked| change.apply(&set.other(place).image, place as u64);
@@ -207,7 +207,7 @@ fn a_repainted_thing_loses_its_colour() {
 }
 
 #[test]
-fn an_image_of_any_size_is_looked_at() {
+fn observer_accepts_any_size() {
     let asked = &SMALL.frames[0];
     for [height, width] in [[1, 1], [3, 2], [120, 160], [240, 320], [50, 350]] {
         let seen = asked.known.observe(&Rgb::black(height, width));

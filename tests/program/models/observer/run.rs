@@ -5,6 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use crate::support::run::{Bench, assert_same_products, records, words};
+use crate::support::snapshot::{lines_with, redacted};
 use serde_json::Value;
 
 const RUN: &str = "--model observer --data frames --levels L0,L3";
@@ -25,11 +26,14 @@ fn by_key(run: &Path) -> BTreeMap<String, Value> {
 }
 
 #[test]
-fn it_is_asked_with_the_image_of_another_scene_too() {
+fn control_sees_another_scene() {
     let bench = Bench::new();
     bench.rooms("frames", 6, "160x120");
     let table = bench.complete(&words(&format!("{RUN} --out run --full")));
-    assert!(table.contains("Known-signal observer (given the untouched frame; not a model)"));
+    insta::assert_snapshot!(lines_with(&table, "(given"), @"
+    Known-signal observer (given the untouched frame; not a model): expected score in % with its 95 % interval, a
+        guess among k choices counts 1/k
+    ");
     let all = records(&bench.path("run"));
     let of = |model: &str| -> Vec<&Value> {
         all.iter()
@@ -118,18 +122,23 @@ fn parts_and_interruptions_change_nothing() {
 }
 
 #[test]
-fn with_one_scene_the_control_is_shown_the_tiles_in_another_order() {
+fn single_scene_control_shuffles_tiles() {
     let bench = Bench::new();
     let line = "--model observer --data rooms:frames=2,size=160x120 --levels L0 --out run";
     let called = bench.call(&words(line));
-    assert_eq!(called.code, Some(0), "{called:?}");
-    assert!(
-        called.stderr.contains("all frames are of one scene"),
-        "{called:?}"
-    );
-    let control = "the tiles of the right images in another order, scores ";
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 0
+     WARN all frames are of one scene, so observer:other-room is not possible; observer:tiles is asked instead:
+        the observer with the tiles of the right image in another order; its score must be that of chance
+    ");
     let stdout = called.stdout.split_whitespace().collect::<Vec<_>>();
-    assert!(stdout.join(" ").contains(control), "{called:?}");
+    insta::assert_snapshot!(redacted(&stdout.join(" ")), @"
+    observer · 8 questions · 2 frames · 8 replies, 0 failed · intervals by frame ! Only 2 frames (8 are needed):
+        intervals and tests are rough. accuracy in % observer L0 95 % untouched 100.0 −97.0 0.0 95 %: how far the
+        widest interval of the row reaches down and up chance 33.4 observer: known-signal observer, given the
+        untouched frame; not a model. Control: the same observer, shown the tiles of the right images in another
+        order, scores 33.4 [2.0, 92.4]; chance is 33.4 run: run report: run/report.html
+    ");
     // Without the control, the observer is not shown.
     let path = bench.path("run/records.jsonl");
     let records = fs::read_to_string(&path).unwrap();
@@ -138,25 +147,38 @@ fn with_one_scene_the_control_is_shown_the_tiles_in_another_order() {
         .filter(|line| !line.contains("observer:tiles"));
     fs::write(&path, own.collect::<Vec<_>>().join("\n") + "\n").unwrap();
     let hidden = bench.call(&words("report run --full"));
-    assert!(
-        hidden
-            .stdout
-            .contains("the observer is not shown: none of its controls"),
-        "{hidden:?}"
-    );
+    insta::assert_snapshot!(hidden, @"
+    exit code: 0
+    stdout:
+     · 0 questions · 0 frames · 0 replies, 0 failed · intervals by frame
+    ! Only 2 frames (8 are needed): intervals and tests are rough.
+    ! the observer is not shown: none of its controls has a reply, so that it guesses without the right image is
+        not shown (observer.csv has all numbers)
+
+    Accuracy in %: strict (lenient where it differs); n replies at each level; 95 %: how far the widest interval
+        reaches down and up
+    chance: 33.43 over 8 questions
+    Known-signal observer (given the untouched frame; not a model): expected score in % with its 95 % interval, a
+        guess among k choices counts 1/k
+    run: run
+    report: run/report.html
+    ");
     let named = bench.call(&words(&line.replace("observer", "observer:other-room")));
-    assert_eq!(named.code, Some(2), "{named:?}");
-    assert!(named.stderr.contains("at least two scenes"), "{named:?}");
+    insta::assert_snapshot!(named.messages(), @"
+    exit code: 2
+    error: --model: observer:other-room needs frames of at least two scenes
+    ");
     let unknown = bench.call(&words(&line.replace("observer", "observer:nothing")));
-    assert_eq!(unknown.code, Some(2), "{unknown:?}");
-    assert!(
-        unknown.stderr.contains("there are: other-room, mosaic-12"),
-        "{unknown:?}"
-    );
+    insta::assert_snapshot!(unknown.messages(), @"
+    exit code: 2
+    error: invalid value 'observer:nothing' for '--model <NAME>': observer:nothing is not a control; there are:
+        other-room, mosaic-12, mosaic-40, mirrored, upside-down, tiles, black, flat, white-noise, pink-noise,
+        negative, blur, shift-32, shift-4, random-masks, outlines
+    ");
 }
 
 #[test]
-fn the_rules_make_the_questions_and_the_answers_alike() {
+fn rules_make_questions_and_answers_alike() {
     let bench = Bench::new();
     bench.rooms("frames", 6, "160x120");
     let rules = include_str!("../../../../src/questions/src/rules.toml");
@@ -188,7 +210,7 @@ fn the_rules_make_the_questions_and_the_answers_alike() {
 }
 
 #[test]
-fn a_control_that_is_not_at_chance_hides_the_observer() {
+fn biased_control_hides_observer() {
     let bench = Bench::new();
     bench.rooms("frames", 6, "160x120");
     bench.complete(&words(&format!("{RUN} --model random --out run")));
@@ -218,7 +240,11 @@ fn a_control_that_is_not_at_chance_hides_the_observer() {
         .lines()
         .filter(|line| line.starts_with(" observer"));
     assert_eq!(rows.count(), 0, "{called:?}");
-    assert!(called.stdout.contains(" random "), "{called:?}");
+    insta::assert_snapshot!(called.lines_with("random"), @"
+    exit code: 0
+    random · 22 questions · 6 frames · 66 replies, 0 failed · intervals by frame
+     random           L0     L3   95 %
+    ");
     for file in ["tables.tex", "figures/accuracy.svg"] {
         let text = fs::read_to_string(bench.path("report").join(file)).unwrap();
         assert!(

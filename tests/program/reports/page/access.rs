@@ -71,7 +71,7 @@ fn open(browser: &mut Browser, url: &str, width: u32, theme: &str) {
     browser.wait("document.documentElement.dataset.ready === 'true'");
 }
 
-/// What breaks a rule, each as its rule, its impact and the first place.
+/// Violations of rules: rule, impact and first place of each.
 fn broken(browser: &mut Browser, rules: &str) -> Value {
     browser.evaluate(&format!("{rules}; 0"));
     browser.evaluate(

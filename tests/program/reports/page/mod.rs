@@ -397,7 +397,7 @@ fn paper(browser: &mut Browser) {
 }
 
 #[test]
-fn the_page_without_true_answers_works_in_a_browser() {
+fn unlabelled_page_works_in_browser() {
     let Some(mut browser) = browser() else {
         return;
     };

@@ -6,9 +6,10 @@ use super::{SAID, browser, count};
 use crate::support::browser::Browser;
 use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::house::House;
+use crate::support::snapshot::redacted;
 
 #[test]
-fn the_page_of_open_questions_works_in_a_browser() {
+fn open_page_works_in_browser() {
     let Some(mut browser) = browser() else {
         return;
     };
@@ -99,7 +100,11 @@ fn open_item(browser: &mut Browser, url: &str) {
         text.as_str().unwrap().to_owned()
     };
     assert_eq!(text(browser, "#r-text"), revealed);
-    assert!(text(browser, "#i-answers").contains(revealed));
+    insta::assert_snapshot!(redacted(&text(browser, "#i-answers")), @"
+    All answersmodelshownmarkanswersaidL0✓ 5/5</script><img src=x
+        onerror=alert(1)>⟨U+202E⟩dna.⟨U+0000⟩saidL4-noise✓ 5/5</script><img src=x
+        onerror=alert(1)>⟨U+202E⟩dna.⟨U+0000⟩
+    ");
     assert_eq!(text(browser, "#r-mark"), "✓ 5/5, mark 5 of 5");
     assert_eq!(text(browser, "#r-judge"), "5");
     assert_eq!(text(browser, "#i-choices"), "right: brown ✓");

@@ -18,7 +18,7 @@ use crate::robustness::hostile::trial::{Damage, Trial, Verdict};
 /// How many processes run at once.
 const AT_ONCE: usize = 2;
 
-/// What came of a campaign.
+/// Result of a campaign.
 #[derive(Default)]
 pub(crate) struct Summary {
     pub(crate) seed: u64,

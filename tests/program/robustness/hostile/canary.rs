@@ -44,7 +44,7 @@ impl Canary {
         Self { folder, state }
     }
 
-    /// What is not as it was made.
+    /// Changes since the canary was created.
     pub(crate) fn change(&self) -> Option<String> {
         let now = entries(&self.folder);
         let is_new = |entry: &&Entry| !self.state.contains(entry);

@@ -4,7 +4,7 @@
 pub(crate) struct Case {
     /// Its words. `URL` is the address of a mock endpoint, whose answers stand in `reply/`.
     pub(crate) line: &'static str,
-    /// The files of which one is damaged, and folders of them.
+    /// Files to damage, one at a time, and their folders.
     pub(crate) reads: &'static [&'static str],
     /// What it needs besides.
     pub(crate) needs: &'static [&'static str],

@@ -47,7 +47,7 @@ fn every_subcommand_has_a_case() {
 }
 
 #[test]
-fn every_call_is_sound_before_a_file_is_damaged() {
+fn undamaged_calls_are_sound() {
     let seeds = Seeds::make();
     let folder = tempfile::tempdir().unwrap();
     let mut wrong = Vec::new();

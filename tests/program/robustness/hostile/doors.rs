@@ -12,7 +12,7 @@ use crate::robustness::hostile::mutators::{Form, step};
 use crate::robustness::hostile::random::Random;
 use crate::robustness::hostile::seeds::Seeds;
 
-/// What is opened, and the files of which one is damaged.
+/// A call that opens files, and the files to damage.
 const DOORS: [(&str, &[&str]); 9] = [
     ("asked", &["asked"]),
     ("frames", &["frames"]),

@@ -17,7 +17,7 @@ fn pipe(path: &Path) {
 
 /// A pipe that nobody writes to was waited for without end, and a device was read until the memory was full.
 #[test]
-fn pipes_and_devices_in_the_place_of_files_are_refused() {
+fn pipes_and_devices_are_refused() {
     let rows = [
         (
             "asked/questions.jsonl",
@@ -91,9 +91,9 @@ fn pipes_and_devices_in_the_place_of_files_are_refused() {
     }
 }
 
-/// What the shell writes for `<(command)` is a pipe as well.
+/// The shell's `<(command)` is a pipe, too.
 #[test]
-fn a_pipe_that_the_command_line_names_is_read() {
+fn named_pipe_argument_is_read() {
     let bench = Bench::new();
     let mut command = bench.command(&words("completions bash --config /dev/stdin"));
     let (reader, mut writer) = std::io::pipe().unwrap();
@@ -104,7 +104,7 @@ fn a_pipe_that_the_command_line_names_is_read() {
 
 /// The header of a broken array went to standard error as it is.
 #[test]
-fn a_line_of_the_log_holds_no_control_character() {
+fn log_line_has_no_control_character() {
     let seeds = Seeds::make();
     let bench = seeds.bench();
     let array = b"\x93NUMPY\x01\x00\x10\x00{'d\x00\x01\x1b[31m\x07\x7f\xc2\x9b, }\n";

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use crate::robustness::hostile::process::Finished;
 
-/// What a process may take.
+/// Limits of a process.
 #[derive(Clone, Copy)]
 pub(crate) struct Limits {
     pub(crate) time: Duration,
@@ -19,7 +19,7 @@ impl Limits {
     };
 }
 
-/// What is wrong with a process.
+/// Fault of a process.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Fault {
     Panic,
@@ -38,7 +38,7 @@ pub(crate) enum Fault {
 }
 
 impl Fault {
-    /// What a fault is called in a summary; a reduced case keeps it.
+    /// Name of the fault in a summary; a reduced case keeps it.
     pub(crate) fn kind(&self) -> &'static str {
         match self {
             Self::Panic => "panic",

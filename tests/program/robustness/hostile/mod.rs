@@ -42,7 +42,7 @@ fn damaged_files_are_read_or_refused() {
 #[test]
 #[ignore = "hours"]
 #[expect(clippy::print_stdout, reason = "the summary is what it is run for")]
-fn many_damaged_files_are_read_or_refused() {
+fn damaged_inputs_are_read_or_refused() {
     let number = |name: &str, default: u64| {
         let value = std::env::var(name).ok();
         value.map_or(default, |value| value.parse().unwrap())

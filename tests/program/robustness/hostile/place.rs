@@ -7,7 +7,7 @@ use std::process::Command;
 
 use crate::robustness::hostile::random::Random;
 
-/// What stands in the place of a file.
+/// Something other than a regular file at the path of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Place {
     LinkTo(&'static str),

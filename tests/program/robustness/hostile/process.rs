@@ -37,7 +37,7 @@ pub(crate) fn program(work: &Path) -> Command {
     command
 }
 
-/// What a process gave.
+/// Output of a process.
 #[derive(Debug)]
 pub(crate) struct Finished {
     pub(crate) code: Option<i32>,
@@ -68,7 +68,7 @@ impl<'a> Running<'a> {
         }
     }
 
-    /// What it wrote so far.
+    /// Output so far.
     pub(crate) fn stdout(&self) -> String {
         let bytes = fs::read(self.folder.join("stdout")).unwrap_or_default();
         String::from_utf8_lossy(&bytes).into_owned()

@@ -27,7 +27,7 @@ impl Random {
         (self.next() % bound.max(1) as u64) as usize
     }
 
-    /// Whether an event of so many percent happens.
+    /// True with a probability of `share` %.
     pub(crate) fn percent(&mut self, share: usize) -> bool {
         self.below(100) < share
     }

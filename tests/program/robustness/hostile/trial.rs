@@ -19,7 +19,7 @@ use crate::robustness::hostile::seeds::Seeds;
 use crate::support::endpoint::MockEndpoint;
 use crate::support::run::files;
 
-/// What is done to a file.
+/// Damage to a file.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Damage {
     /// The numbers of the steps.
@@ -36,7 +36,7 @@ pub(crate) struct Trial<'a> {
     pub(crate) damage: Damage,
 }
 
-/// What came of a trial.
+/// Result of a trial.
 pub(crate) struct Verdict {
     pub(crate) code: Option<i32>,
     pub(crate) faults: Vec<Fault>,

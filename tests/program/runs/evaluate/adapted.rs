@@ -4,6 +4,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::run::{Bench, model_args, records, words};
+use crate::support::snapshot::lines_with;
 use crate::support::table::check_rows;
 use serde_json::{Value, json};
 
@@ -20,7 +21,7 @@ fn manifest(bench: &Bench) -> Value {
 
 /// Questions that all share one image, so that a refusal of each would be the same.
 #[test]
-fn a_refused_field_costs_one_request_and_is_said_in_the_report() {
+fn refused_field_is_reported() {
     let bench = Bench::with_questions(30);
     let mock = MockEndpoint::answering(|body| match body.get("temperature") {
         Some(_) => refusal("temperature", "`temperature` is deprecated for this model."),
@@ -32,7 +33,10 @@ fn a_refused_field_costs_one_request_and_is_said_in_the_report() {
     assert_eq!(mock.requests().len(), 31);
     let noted = json!(["no temperature is sent: the server's own is used"]);
     assert_eq!(manifest(&bench)["settings"]["adapted for m"], noted);
-    assert!(printed.contains("Requests to m were changed"), "{printed}");
+    insta::assert_snapshot!(
+        lines_with(&printed, "Requests"),
+        @"! Requests to m were changed, because the server refused what was sent first: no"
+    );
     // A run in which nothing was refused says nothing of it.
     let other = Bench::with_questions(3);
     let mock = MockEndpoint::start([Answer::text("C")]);
@@ -42,7 +46,7 @@ fn a_refused_field_costs_one_request_and_is_said_in_the_report() {
 
 /// Flags, what the server says to them, and what stands in the message: its words and the flag.
 #[test]
-fn what_the_user_asked_for_stops_the_run() {
+fn what_user_asked_for_stops_run() {
     let rows = [
         (
             "--temperature 0.5",
@@ -87,7 +91,7 @@ fn what_the_user_asked_for_stops_the_run() {
 
 /// The same trials by each wire, but for the Responses API where it is asked for.
 #[test]
-fn a_wire_that_is_found_out_is_no_other_trial() {
+fn discovered_wire_keeps_trial_key() {
     let bench = Bench::with_questions(3);
     let stream_only = MockEndpoint::answering(|body| {
         if body.get("stream").is_none() {
@@ -116,7 +120,7 @@ fn a_wire_that_is_found_out_is_no_other_trial() {
 
 /// A router may pass a later request on to a provider that takes less: no trial and no retry is lost by it.
 #[test]
-fn a_field_that_is_refused_later_costs_no_trial() {
+fn late_refused_field_costs_no_trial() {
     let bench = Bench::with_questions(40);
     let asked = AtomicUsize::new(0);
     let mock = MockEndpoint::answering(move |body| {

@@ -10,10 +10,11 @@ use super::text;
 use crate::support::frames::png;
 use crate::support::onnx;
 use crate::support::run::{Bench, records, words};
+use crate::support::snapshot::lines_with;
 use crate::support::table::check_rows;
 
 #[test]
-fn the_built_in_rooms_run_without_anything() {
+fn built_in_rooms_run_without_anything() {
     let bench = Bench::new();
     let args = words("--model observer --blind-model observer --out run --full");
     let table = bench.complete(&args);
@@ -61,10 +62,11 @@ fn every_condition_runs_raw_and_enhanced() {
         "--data frames --model random --llie bright.onnx --llie curve.onnx --llie-anyway --out run",
     );
     let table = bench.complete(&args);
-    assert!(
-        table.contains("with noise + bright") && table.contains("with noise + curve"),
-        "{table}"
-    );
+    insta::assert_snapshot!(lines_with(&table, "with noise"), @"
+    with noise            0.0   33.3   66.7   66.7   33.3   33.3   −45.9 +98.4
+    with noise + bright         33.3   66.7    0.0   33.3   33.3   −65.4 +98.4
+    with noise + curve          33.3   66.7   33.3   66.7   33.3   −65.4 +65.4
+    ");
     let records = records(&bench.path("run"));
     // L0, five of each variant, five for each enhancer on noise.
     assert_eq!(records.len(), 3 * (1 + 5 + 5 + 5 + 5));
@@ -118,7 +120,7 @@ fn threads_and_order_change_no_byte() {
 }
 
 #[test]
-fn several_images_enhanced_at_once_are_the_same_images() {
+fn parallel_enhancement_keeps_images() {
     let bench = Bench::new();
     bench.rooms("frames", 8, "160x96");
     let images = |run: &str, threads: &str| -> BTreeMap<String, String> {
@@ -214,7 +216,7 @@ fn ready_made_sets_are_read() {
 }
 
 #[test]
-fn two_scripts_that_say_the_same_are_two_models() {
+fn equal_scripts_are_two_models() {
     let bench = Bench::with_frames();
     for script in ["one.jsonl", "two.jsonl"] {
         bench.file(script, "{\"default\":\"A\"}\n");

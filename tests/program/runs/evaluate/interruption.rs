@@ -9,6 +9,7 @@ use std::time::Duration;
 use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::process::{signal, wait_until};
 use crate::support::run::{Bench, PROGRAM, model_args, records};
+use crate::support::snapshot::redacted;
 
 #[test]
 fn an_interrupt_keeps_what_was_answered() {
@@ -34,7 +35,7 @@ fn an_interrupt_keeps_what_was_answered() {
 
 /// A batch system sends one SIGTERM, and kills some time later: what came is written before that.
 #[test]
-fn an_interrupt_gives_up_after_the_grace_what_is_never_answered() {
+fn interrupt_abandons_requests_after_grace() {
     let bench = Bench::with_frames();
     let endpoint = MockEndpoint::start([Answer::text("A"), Answer::silent()]);
     let url = endpoint.base_url();
@@ -58,20 +59,30 @@ fn an_interrupt_gives_up_after_the_grace_what_is_never_answered() {
     let output = program.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(130), "{output:?}");
     let said = String::from_utf8(output.stderr).unwrap();
-    assert!(
-        said.contains("requests given up while in flight: 1;"),
-        "{said}"
+    insta::assert_snapshot!(
+        redacted(said.trim_start()),
+        @"WARN requests given up while in flight: 1; they may be paid for, and the same command asks them again"
     );
     assert_eq!(records(&bench.path("run")).len(), 1);
     let table = String::from_utf8(output.stdout).unwrap();
-    assert!(
-        table.contains("cancelled: 1 of 3 trials answered, 0 failed"),
-        "{table}"
-    );
+    insta::assert_snapshot!(redacted(&table), @"
+    m · 1 question · 1 frame · 1 reply, 0 failed · intervals by question
+    ! run: cancelled: 1 of 3 trials answered, 0 failed. The same command asks the
+      rest.
+    ! Only 1 question (8 are needed): intervals and tests are rough.
+
+     accuracy in %
+     m            L0   95 %
+     untouched   0.0   0.0 +79.3
+     95 %: how far the widest interval of the row reaches down and up
+     chance 44.4
+    run: run
+    report: run/report.html
+    ");
 }
 
 #[test]
-fn an_interrupt_does_not_wait_for_retries() {
+fn interrupt_does_not_wait_for_retries() {
     let bench = Bench::with_frames();
     let later = Answer::error(429, "slow_down", "later").header("retry-after", "100");
     let endpoint = MockEndpoint::start([Answer::text("A"), later]);
@@ -85,10 +96,20 @@ fn an_interrupt_does_not_wait_for_retries() {
     let output = program.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(130));
     let table = String::from_utf8(output.stdout).unwrap();
-    assert!(
-        table.contains("cancelled: 1 of 3 trials answered, 0 failed"),
-        "{table}"
-    );
+    insta::assert_snapshot!(redacted(&table), @"
+    m · 1 question · 1 frame · 1 reply, 0 failed · intervals by question
+    ! run: cancelled: 1 of 3 trials answered, 0 failed. The same command asks the
+      rest.
+    ! Only 1 question (8 are needed): intervals and tests are rough.
+
+     accuracy in %
+     m            L0   95 %
+     untouched   0.0   0.0 +79.3
+     95 %: how far the widest interval of the row reaches down and up
+     chance 44.4
+    run: run
+    report: run/report.html
+    ");
     assert_eq!(
         records(&bench.path("run")).len(),
         1,
@@ -98,7 +119,7 @@ fn an_interrupt_does_not_wait_for_retries() {
 
 /// A closed terminal asks to stop, as SIGTERM does; under `nohup` it does not.
 #[test]
-fn a_closed_terminal_interrupts_unless_it_is_ignored() {
+fn closed_terminal_interrupts_unless_ignored() {
     let bench = Bench::with_frames();
     let endpoint = MockEndpoint::answering(|_| {
         thread::sleep(Duration::from_millis(300));

@@ -7,18 +7,19 @@ use serde_json::{Value, json};
 use super::text;
 use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::run::{Bench, model_args, records, words};
+use crate::support::snapshot::lines_with;
 use crate::support::table::check_rows;
 
 #[test]
-fn a_record_and_a_row_keep_the_contract() {
+fn record_and_row_keep_contract() {
     let bench = Bench::with_frames();
     bench.file("script.jsonl", "{\"question\":\"a1\",\"reply\":\"No.\"}\n{\"question\":\"b1\",\"condition\":\"L1-ev\",\"reply\":\"too dark to see\"}\n{\"default\":\"**A**\"}\n");
     let table = bench.complete(&words(
         "--data frames --model script:script.jsonl --levels L0,L1 --variant ev --out run --full",
     ));
-    assert!(
-        table.contains("(66.7)"),
-        "the lenient parsing differs: {table}"
+    insta::assert_snapshot!(
+        lines_with(&table, "(66.7)"),
+        @"script:script.jsonl   untouched       33.3 (66.7)          3      2 (0)        0   −27.2 +45.9"
     );
     let records = records(&bench.path("run"));
     let record = records
@@ -116,7 +117,7 @@ fn json_is_the_summary() {
 
 /// A router names the provider that it passed a request on to: kept in the record, and said if there are several.
 #[test]
-fn the_providers_of_a_router_are_kept_and_counted() {
+fn router_providers_are_counted() {
     let reply = |provider: &str| {
         let message = json!({"role": "assistant", "content": "A"});
         Answer::json(

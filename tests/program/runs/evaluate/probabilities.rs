@@ -2,6 +2,7 @@
 
 use crate::support::endpoint::{Answer, MockEndpoint, Request};
 use crate::support::run::{Bench, model_args, records, words};
+use crate::support::snapshot::redacted;
 use crate::support::table::check_rows;
 use serde_json::{Value, json};
 
@@ -36,7 +37,7 @@ fn kept(mock: &MockEndpoint, args: &str) -> Vec<Value> {
 }
 
 #[test]
-fn the_probability_of_each_choice_is_kept() {
+fn probability_of_each_choice_is_kept() {
     let mock = MockEndpoint::start([Answer::json(200, &sure())]);
     for record in kept(&mock, ASKED) {
         let options = &record["options"];
@@ -67,7 +68,7 @@ fn the_probability_of_each_choice_is_kept() {
 
 /// Replies that say nothing of the choices: the answer is read as ever.
 #[test]
-fn what_a_server_does_not_state_is_not_made_up() {
+fn unstated_probabilities_are_not_invented() {
     let without = |logprobs: Value| {
         let mut body = sure();
         body["choices"][0]["logprobs"] = logprobs;
@@ -96,7 +97,7 @@ fn what_a_server_does_not_state_is_not_made_up() {
 }
 
 #[test]
-fn a_server_without_probabilities_is_asked_without_them() {
+fn probabilities_are_dropped_if_unsupported() {
     let mock = MockEndpoint::answering(|body| match body.get("logprobs") {
         Some(_) => Answer::error(
             400,
@@ -198,10 +199,20 @@ fn the_report_sets_confidence_against_accuracy() {
     let bench = Bench::with_questions(3);
     let mock = MockEndpoint::start([Answer::text("C")]);
     let printed = bench.complete(&model_args(&mock.base_url(), ASKED));
-    assert!(
-        printed.contains("The confidence of m is not available"),
-        "{printed}"
-    );
+    insta::assert_snapshot!(redacted(&printed), @"
+    m · 3 questions · 1 frame · 3 replies, 0 failed · intervals by question
+    ! Only 3 questions (8 are needed): intervals and tests are rough.
+    ! The confidence of m is not available: its server states no probabilities of
+      tokens, or its replies do not begin with a choice.
+
+     accuracy in %
+     m            L0   95 %
+     untouched 100.0   −56.1 0.0
+     95 %: how far the widest interval of the row reaches down and up
+     chance 33.3
+    run: run
+    report: run/report.html
+    ");
     assert!(!bench.path("run/calibration.csv").exists());
     for figure in ["confidence", "reliability"] {
         assert!(!bench.path(&format!("run/figures/{figure}.svg")).exists());
@@ -216,12 +227,11 @@ fn probabilities_need_a_temperature_of_zero() {
     let base = mock.base_url();
     let args = model_args(&base, ASKED);
     let called = bench.call(&[args.clone(), words("--temperature 0.5")].concat());
-    assert_eq!(called.code, Some(2), "{called:?}");
-    assert!(
-        called.stderr.contains("--temperature 0"),
-        "{}",
-        called.stderr
-    );
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 2
+    error: --request probabilities: the probabilities of tokens depend on the temperature: --temperature 0, auto
+        or default expected
+    ");
     assert!(mock.requests().is_empty());
     bench.complete(&[args, words("--temperature 0")].concat());
 }

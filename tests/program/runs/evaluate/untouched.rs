@@ -9,6 +9,7 @@ use super::text;
 use crate::support::house::House;
 use crate::support::onnx;
 use crate::support::run::{Bench, records, words};
+use crate::support::snapshot::{lines_with, redacted};
 use crate::support::table::check_rows;
 
 /// A folder `photos` with three photographs whose codes reach up to `light`, and a question about each. The script answers by light:
@@ -71,7 +72,7 @@ fn mean(image: &image::RgbImage) -> f64 {
 }
 
 #[test]
-fn dark_photographs_are_asked_as_they_are_and_enhanced() {
+fn dark_photographs_are_asked_and_enhanced() {
     let bench = photos(40);
     let called = bench.call(&words(&format!("{ASK} --levels L0 --llie-on l0")));
     assert_eq!(called.code, Some(0), "{called:?}");
@@ -103,13 +104,17 @@ fn dark_photographs_are_asked_as_they_are_and_enhanced() {
 
     // The image is made again from what the run holds, and is another one than the file.
     let shown = bench.call(&words("show run q1 --condition L0+lift"));
-    assert_eq!(shown.code, Some(0), "{shown:?}");
-    assert!(
-        shown
-            .stdout
-            .contains("L0+lift: the same bytes as were sent"),
-        "{shown:?}"
-    );
+    insta::assert_snapshot!(shown, @r#"
+    exit code: 0
+    stdout:
+    q1, about 1.png
+    Is there a sink?
+      A. yes  (true)
+      B. no
+    L0+lift: run/shown/1_L0+lift.png
+    L0+lift: the same bytes as were sent ([DIGEST])
+      script:answers.jsonl: ✗ wrong: "no"
+    "#);
     let open = |path: &str| image::open(bench.path(path)).unwrap().to_rgb8();
     let (photo, lifted) = (open("photos/1.png"), open("run/shown/1_L0+lift.png"));
     assert!(
@@ -122,7 +127,11 @@ fn dark_photographs_are_asked_as_they_are_and_enhanced() {
     // The set for other tools holds the same pixels.
     let flags = "--levels L0 --llie lift --llie-on l0 --out sets";
     let exported = bench.complete(&words(&format!("export imagefolder photos {flags}")));
-    assert!(exported.contains("in 2 conditions"), "{exported}");
+    insta::assert_snapshot!(redacted(&exported), @"
+    3 questions about 3 images in 2 conditions:
+    sets/L0/metadata.jsonl
+    sets/L0+lift/metadata.jsonl
+    ");
     let sets = crate::support::run::files(&bench.path("sets"));
     let is_one = |path: &&std::path::PathBuf| {
         let path = path.to_string_lossy();
@@ -153,11 +162,14 @@ fn a_row_holds_one_treatment() {
 }
 
 #[test]
-fn the_report_has_the_untouched_images_enhanced() {
+fn report_has_untouched_images_enhanced() {
     let bench = photos(220);
     let full = format!("{ASK} --levels L0,L3 --llie-on all --full");
     let table = bench.complete(&words(&full));
-    assert!(table.contains("untouched + lift"), "{table}");
+    insta::assert_snapshot!(lines_with(&table, "untouched"), @"
+    script:answers.jsonl   untouched              100.0         3          0        0   −56.1 0.0
+    script:answers.jsonl   untouched + lift         0.0         3          0        0   0.0 +56.1
+    ");
     let read = |name: &str| fs::read_to_string(bench.path("run").join(name)).unwrap();
     let lines = |name: &str, field: &str| {
         let text = read(name);
@@ -187,7 +199,7 @@ fn the_report_has_the_untouched_images_enhanced() {
 }
 
 #[test]
-fn an_enhancer_without_an_image_is_an_error() {
+fn enhancer_without_image_is_error() {
     let bench = photos(220);
     let only = "the enhancer would never be used: only L0 is asked; --llie-on l0 enhances the untouched images";
     let rows = [
@@ -217,22 +229,21 @@ fn an_enhancer_without_an_image_is_an_error() {
     let called = bench.call(&words(
         "export llava photos --out sets --llie lift --levels L0",
     ));
-    assert_eq!(called.code, Some(2), "{called:?}");
-    assert!(called.stderr.contains(only), "{called:?}");
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 2
+    error: --llie: the enhancer would never be used: only L0 is asked; --llie-on l0 enhances the untouched images
+    ");
     // A model that is shown no image is told so, and asked.
     let blind = "--blind-model random --data photos --llie lift --levels L0 --out blind";
     let called = bench.call(&words(blind));
-    assert_eq!(called.code, Some(0), "{called:?}");
-    assert!(
-        called
-            .stderr
-            .contains("--llie: no effect: no model is shown an image"),
-        "{called:?}"
-    );
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 0
+     WARN --levels, --llie: no effect: no model is shown an image
+    ");
 }
 
 #[test]
-fn the_estimate_counts_the_untouched_images_enhanced() {
+fn estimate_counts_untouched_images_enhanced() {
     let bench = photos(220);
     let rows = [("noise", 12), ("l0,noise", 15), ("all", 18)];
     // Three questions about three images in L0, L3-ev, L3-noise and the enhanced ones.
@@ -297,7 +308,7 @@ fn dark_images_are_noticed_once() {
 }
 
 #[test]
-fn open_questions_are_asked_about_untouched_images_enhanced() {
+fn open_questions_cover_untouched_enhanced() {
     let house = House::new();
     onnx::gain(2.0).write(&house.0.path(""), "bright.onnx");
     house.0.file("a.jsonl", "{\"default\": \"an answer\"}");

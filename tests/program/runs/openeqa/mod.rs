@@ -13,7 +13,7 @@ use serde_json::Value;
 
 use crate::support::endpoint::{MockEndpoint, Request};
 
-/// What an endpoint was sent.
+/// Requests that an endpoint received.
 fn sent(mock: &MockEndpoint) -> Vec<Value> {
     mock.requests().iter().map(Request::json).collect()
 }

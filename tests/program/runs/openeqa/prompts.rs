@@ -94,7 +94,7 @@ fn check_judge_prompts(requests: &[Value]) {
 }
 
 #[test]
-fn every_prompt_is_upstreams_byte_for_byte() {
+fn prompts_match_upstream() {
     let house = House::new();
     let model = MockEndpoint::start([
         Answer::text("It's brown. It may"),
@@ -128,15 +128,14 @@ fn every_prompt_is_upstreams_byte_for_byte() {
         house.read("run/upstream/m-L0-j-metrics.json"),
         json!({"q1": 5, "q2": 3, "q3": 1})
     );
-    assert!(
-        called.stdout.contains("3 of 3 answers scored\n1 cut after"),
-        "{}",
-        called.stdout
-    );
+    insta::assert_snapshot!(called.lines_with("cut after"), @"
+    exit code: 0
+    1 cut after their last full stop before they were judged, as upstream does
+    ");
 }
 
 #[test]
-fn blind_models_are_asked_and_read_as_upstream_does() {
+fn blind_models_follow_upstream() {
     let house = House::new();
     let model = MockEndpoint::start([
         Answer::text("A: a bed\nExplanation: x"),
@@ -156,16 +155,18 @@ fn blind_models_are_asked_and_read_as_upstream_does() {
     let prompt = request["messages"][0]["content"].as_str().unwrap();
     assert!(prompt.ends_with("\n\nQ: What colour is it?"), "{prompt}");
     // Two marks of 5 and an answer that is none.
-    assert!(
-        called.stdout.contains("m without images: 66.7 ["),
-        "{}",
-        called.stdout
-    );
-    assert!(
-        called.stdout.contains("1 without an answer"),
-        "{}",
-        called.stdout
-    );
+    insta::assert_snapshot!(called, @r#"
+    exit code: 0
+    stdout:
+    Score in % (LLM-Match, marked by script:j.jsonl, protocol upstream): mean (difference from L0), and how far
+        the widest 95 % interval over 2 episodes reaches down and up
+    m without images: 66.7 [1.3–99.7], n 3
+    3 of 3 answers scored
+    1 without an answer (none in a file, or no "A:" in the reply of a blind model):
+     scored 0, unjudged
+    run: run
+    report: run/report.html
+    "#);
     assert_eq!(
         house.read("run/upstream/m-blind.json")[1]["answer"],
         Value::Null

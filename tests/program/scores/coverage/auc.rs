@@ -14,7 +14,7 @@ use darkqa_score::photographs::FidelityFindings;
 const FRAMES: usize = 2;
 const QUESTIONS: usize = 5;
 
-/// What the replies of the conditions share.
+/// Effects that the replies of all conditions share.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Shared {
     /// Effects of the frame and of the question, each with this standard deviation in logits.
@@ -37,7 +37,7 @@ struct AucDesign {
     conditions: usize,
     scenes: usize,
     shared: Shared,
-    /// What one standard deviation of the PSNR adds to the logit of a right reply.
+    /// Effect of one standard deviation of PSNR on the logit of a right reply.
     slope: f64,
 }
 
@@ -243,7 +243,7 @@ fn auc_rates(design: AucDesign, runs: usize) -> AucRates {
 
 #[test]
 #[ignore = "takes minutes; prints a table of src/docs/numbers.md"]
-fn the_coverage_and_size_of_the_auc_over_conditions() {
+fn auc_coverage_over_conditions() {
     let shared = [0.0, 0.5, 1.0].map(Shared::Effects);
     let shared: Vec<Shared> = shared.into_iter().chain([Shared::Luck]).collect();
     let mut designs = Vec::new();
@@ -282,7 +282,7 @@ fn the_coverage_and_size_of_the_auc_over_conditions() {
 }
 
 #[test]
-fn the_same_scenes_in_many_conditions_are_no_more_evidence() {
+fn repeated_scenes_add_no_evidence() {
     let rates = auc_rates(
         AucDesign {
             conditions: 15,

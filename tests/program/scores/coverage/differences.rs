@@ -45,12 +45,12 @@ fn the_coverage_of_paired_differences() {
 
 #[test]
 #[ignore = "takes a minute; prints a table of src/docs/numbers.md"]
-fn the_coverage_of_differences_of_six_models() {
+fn coverage_of_differences_of_six_models() {
     EVEN.print(["difference of 6 models together"], of_six, 1000);
 }
 
 #[test]
-fn differences_that_no_pair_shows_are_not_ruled_out() {
+fn undetected_differences_are_not_excluded() {
     // Most runs of so few clusters lose nothing, or all of it in one cluster.
     let design = Design {
         clusters: 8,

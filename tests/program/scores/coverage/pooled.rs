@@ -131,7 +131,7 @@ fn answer(random: &mut StdRng, records: &mut [Record], clusters: &[usize], desig
 
 #[test]
 #[ignore = "takes minutes; prints a table of src/docs/numbers.md"]
-fn the_size_and_power_of_the_pooled_test() {
+fn size_and_power_of_pooled_test() {
     println!(
         "\n| clusters × questions | scene effect in logits | effect in points | rejected, 6 models pooled | rejected, one model | interval holds the truth |\n|---|---|---|---|---|---|"
     );
@@ -169,7 +169,7 @@ fn the_size_and_power_of_the_pooled_test() {
 }
 
 #[test]
-fn the_pooled_test_keeps_its_size_and_finds_more_than_one_model() {
+fn pooled_test_beats_single_models() {
     let design = |scene_effect, effect| PooledDesign {
         clusters: 25,
         size: 8,

@@ -109,7 +109,7 @@ fn the_coverage_of_kappa() {
 }
 
 #[test]
-fn intervals_near_all_right_hold_the_truth_under_strong_clumps() {
+fn extreme_shares_are_covered_when_clumped() {
     let strong = |clusters, size| Design {
         clusters,
         size,

@@ -16,7 +16,7 @@ const SHAPES: [Shape; 3] = [Shape::LogNormal(0.5), Shape::LogNormal(1.0), Shape:
 
 #[test]
 #[ignore = "takes half a minute; prints a table of src/docs/numbers.md"]
-fn the_coverage_of_shares_with_clusters_of_unequal_size() {
+fn share_coverage_with_unequal_clusters() {
     for shape in SHAPES {
         designs(shape).print(["share"], shares::share, 2000);
     }
@@ -24,7 +24,7 @@ fn the_coverage_of_shares_with_clusters_of_unequal_size() {
 
 #[test]
 #[ignore = "takes half a minute; prints a table of src/docs/numbers.md"]
-fn the_coverage_of_differences_with_clusters_of_unequal_size() {
+fn difference_coverage_with_unequal_clusters() {
     for shape in SHAPES {
         designs(shape).print(["paired difference"], differences::paired, 1000);
         let six = ["difference of 6 models together"];
@@ -33,7 +33,7 @@ fn the_coverage_of_differences_with_clusters_of_unequal_size() {
 }
 
 #[test]
-fn shares_of_which_one_cluster_has_a_third_hold_the_truth() {
+fn shares_with_one_large_cluster() {
     let design = |mean, correlation| Design {
         clusters: 25,
         size: 8,

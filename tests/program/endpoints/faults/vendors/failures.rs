@@ -20,10 +20,10 @@ type Case = (
     &'static [&'static str],
 );
 
-/// What no wait and no other request helps: one request, and the remedy.
+/// Failures that neither waiting nor another request solves: one request, and the remedy.
 #[test]
 #[expect(clippy::too_many_lines, reason = "a table")]
-fn what_does_not_pass_is_told_in_the_words_of_each_vendor() {
+fn vendor_failure_wordings_are_recognized() {
     use FailureKind::{Filtered, RateLimit, Request, Server};
     use Reach::{Endpoint, Trial};
     let effort = || Parameters {

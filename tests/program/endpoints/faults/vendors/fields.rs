@@ -25,7 +25,7 @@ fn with_probabilities() -> Parameters {
 /// A field that is left to the program: each server's words of refusal cost one request, and the field is sent otherwise then.
 #[test]
 #[expect(clippy::too_many_lines, reason = "a table")]
-fn refusals_in_the_words_of_each_vendor_cost_one_request() {
+fn vendor_refusals_cost_one_request() {
     let none = || Value::Null;
     let cases: Vec<(&str, Parameters, Answer, (&str, Value))> = vec![
         (

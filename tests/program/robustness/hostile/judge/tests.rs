@@ -56,7 +56,7 @@ fn each_fault_is_found() {
 }
 
 #[test]
-fn each_touch_of_the_canary_is_found() {
+fn each_touch_of_canary_is_found() {
     let rows = [
         "echo x >> ../canary/private.txt",
         "touch ../canary/picture.png",

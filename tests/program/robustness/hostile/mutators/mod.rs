@@ -11,7 +11,7 @@ use std::path::Path;
 
 use crate::robustness::hostile::random::Random;
 
-/// What a file holds.
+/// Kind of a file's content.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Form {
     /// Values of JSON, one a line or one in all.

@@ -7,7 +7,7 @@ use crate::support::frames::png;
 use crate::support::onnx;
 
 #[test]
-fn a_step_is_the_same_for_the_same_number_and_mostly_changes_the_file() {
+fn mutation_step_is_deterministic() {
     let files = [
         ("a.png", png(20)),
         ("a.onnx", onnx::gain(0.5).model()),
@@ -37,7 +37,7 @@ fn a_step_is_the_same_for_the_same_number_and_mostly_changes_the_file() {
 }
 
 #[test]
-fn a_model_is_read_as_a_message_and_written_as_it_was() {
+fn model_message_round_trips() {
     let model = onnx::external_gain("x.bin").model();
     let mut all_lie = model.clone();
     // Most steps keep the lengths true, so that the damage is reached.

@@ -50,7 +50,7 @@ pub(super) fn make(bench: &Bench) {
     bench.file("request/body.json", body);
 }
 
-/// What a client asks of `serve`.
+/// Requests of a client to `serve`.
 fn chat_request() -> Value {
     json!({
         "model": "darkqa-observer", "temperature": 0, "max_tokens": 9,
