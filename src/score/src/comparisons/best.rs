@@ -395,7 +395,7 @@ impl Scores {
     /// Tests the mean accuracy of the first model minus that of the second over a range of levels.
     fn test_pair(&self, [first, second]: [usize; 2], levels: Range<usize>) -> PairedTest {
         self.test(levels.len(), |item| {
-            item.right_count(first, &levels) - item.right_count(second, &levels)
+            item.right(first, &levels) - item.right(second, &levels)
         })
     }
 
@@ -413,12 +413,12 @@ impl Scores {
             .collect();
         let count = dark.len() as f64;
         let sums: Vec<(f64, f64)> = self
-            .cluster_sums(|item| item.right_count(model, &dark))
+            .cluster_sums(|item| item.right(model, &dark))
             .into_iter()
             .map(|sum| (sum.net as f64 / count, f64::from(sum.items)))
             .collect();
         let clean_counts: Vec<ClusterCount> = self
-            .cluster_sums(|item| item.right_count(model, &(0..1)))
+            .cluster_sums(|item| item.right(model, &(0..1)))
             .into_iter()
             .map(|sum| ClusterCount {
                 right: sum.net as u32,
@@ -429,8 +429,8 @@ impl Scores {
         let chance = self.items.iter().map(|item| item.guess).sum::<f64>() / n as f64;
         let loss = (clean.low > chance).then(|| {
             self.test(dark.len(), |item| {
-                item.right_count(model, &dark)
-                    - item.right_count(model, &(0..1)) * dark.len() as i64
+                item.right(model, &dark)
+                    - item.right(model, &(0..1)) * dark.len() as i64
             })
             .difference
         });
