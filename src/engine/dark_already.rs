@@ -1,4 +1,4 @@
-//! Frames that are dark before their light is reduced: [`warn`].
+//! Warnings about images that are dark before any synthetic darkening: [`warn`] and [`print_note`].
 
 use rayon::prelude::*;
 
@@ -11,13 +11,13 @@ use crate::types::{AxisLevel, SetLight};
 use darkqa_enhance::{EnhancerArgs, brightness as brightness_in_codes};
 use darkqa_light::{LightSettings, mean_luminance};
 
-/// Maximum number of frames that are measured; chosen.
+/// Maximum number of frames to measure; chosen.
 const MAX_SAMPLED: usize = 24;
 
-/// Mean luma, from 0 to 255, below which a frame is dark. Chosen: a well-lit frame has about 100.
+/// Mean luma, from 0 to 255, below which a frame counts as dark. Chosen: a well-lit frame has about 100.
 const DARK: f64 = 40.0;
 
-/// Advice for images whose mean luma, from 0 to 255, has this median; `None` if they are not dark.
+/// Advice on dark images; `None` if they are not dark. `median` is the median of their mean luma, from 0 to 255.
 pub(crate) fn advice(median: f64) -> Option<String> {
     (median < DARK).then(|| {
         format!(
@@ -27,7 +27,7 @@ pub(crate) fn advice(median: f64) -> Option<String> {
     })
 }
 
-/// Prints a note about photographs taken in the dark if they are asked as they are, or a warning if they are darkened further.
+/// Prints a note if photographs taken in the dark are asked about unchanged, or a warning if they are darkened further.
 pub(crate) fn print_note(job: &JobSettings, progress: &Progress) {
     if job.set_light == SetLight::Lit {
         return;
@@ -56,19 +56,19 @@ pub(crate) fn brightness(frames: &dyn Frames, sources: &[Source]) -> Option<(f64
 /// Tells whether dark images in a data set are expected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum DarkImages {
-    /// The data set is declared as dark, or its images are asked undarkened only, both raw and enhanced.
+    /// The data set is declared as dark, or only L0 is asked, with and without enhancement.
     Expected,
-    /// The user may take the images for well-lit ones.
+    /// The user may assume that the images are well lit.
     Unexpected,
 }
 
 impl DarkImages {
-    /// Judges a data set by its declared light, and by the levels and enhancers that it is asked with.
+    /// Decides from the declared light of a data set and from the levels and enhancers of the job.
     pub(crate) fn new(set: SetLight, light: &LightSettings, enhancers: &EnhancerArgs) -> Self {
-        let is_undarkened_only = light.levels == [AxisLevel::L0]
+        let asks_raw_and_enhanced_l0 = light.levels == [AxisLevel::L0]
             && !enhancers.is_empty()
             && enhancers.on().includes_kind(None);
-        if set == SetLight::Dark || is_undarkened_only {
+        if set == SetLight::Dark || asks_raw_and_enhanced_l0 {
             Self::Expected
         } else {
             Self::Unexpected
@@ -89,9 +89,8 @@ pub(crate) fn warn<E: Experiment>(experiment: &E) {
     }
 }
 
-/// Median over up to [`MAX_SAMPLED`] evenly spaced frames of their mean luma, from 0 to 255; of an even number the upper middle value.
-/// Built-in rooms are skipped, because they are lit, and so are files that cannot be decoded, which their trials report. `None` if no
-/// frame is left.
+/// Median of the mean luma, from 0 to 255, of up to [`MAX_SAMPLED`] evenly spaced frames; the upper middle value if their number is even.
+/// Skips built-in rooms, which are lit, and files that cannot be decoded, which are reported in their trials. `None` if no frame is left.
 fn median_luma(frames: &dyn Frames, sources: &[Source]) -> Option<f64> {
     let mut sample = sample_frames(frames, sources, |picture| match picture {
         Picture::Encoded(_) => Some(brightness_in_codes(&picture.decode().ok()?)),
@@ -108,11 +107,11 @@ fn sample_frames(
     measure: impl Fn(&Picture) -> Option<f64> + Sync,
 ) -> Vec<f64> {
     let all: Vec<&SourceFrame> = sources.iter().flat_map(|source| &source.frames).collect();
-    let number = all.len().min(MAX_SAMPLED);
-    (0..number)
+    let count = all.len().min(MAX_SAMPLED);
+    (0..count)
         .into_par_iter()
         .filter_map(|index| {
-            let frame = all[index * all.len() / number];
+            let frame = all[index * all.len() / count];
             measure(&frames.picture(&frame.id).ok()?)
         })
         .collect()

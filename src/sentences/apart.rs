@@ -1,4 +1,4 @@
-//! Sentences about people, and about models that answered fewer questions than others. Neither are part of any mean.
+//! Sentences about subjects that are excluded from all means: people, and models that answered fewer questions than others.
 
 use std::collections::BTreeSet;
 
@@ -13,14 +13,15 @@ use darkqa_score::findings::Findings;
 use darkqa_score::grid::Grid;
 use darkqa_score::model_in_condition::{ModelInCondition, is_reference};
 
-/// A sentence for each of them: the accuracy at L0 and at the darkest level, and that of the other models on the same questions.
+/// One sentence for each person and model excluded from means: its accuracy at L0 and at the darkest level, and the mean accuracy of the
+/// other models on the same questions.
 pub(super) fn apart(findings: &Findings<'_>) -> Vec<Sentence> {
-    let others = others(findings);
+    let others = models_in_means(findings);
     if others.is_empty() {
         return Vec::new();
     }
     let topics = Topic::all(findings);
-    names(findings)
+    excluded_names(findings)
         .into_iter()
         .filter_map(|name| {
             topics
@@ -31,8 +32,8 @@ pub(super) fn apart(findings: &Findings<'_>) -> Vec<Sentence> {
         .collect()
 }
 
-/// The names of people, and of models that a finding leaves out, in the order of tables.
-fn names<'f>(findings: &'f Findings<'_>) -> Vec<&'f str> {
+/// Names of people and of models that a finding leaves out, in the order of the grid.
+fn excluded_names<'f>(findings: &'f Findings<'_>) -> Vec<&'f str> {
     let left_out: BTreeSet<&str> = findings
         .left_out
         .iter()
@@ -53,26 +54,27 @@ fn names<'f>(findings: &'f Findings<'_>) -> Vec<&'f str> {
     names
 }
 
-/// The models that means include.
-fn others<'f>(findings: &'f Findings<'_>) -> Vec<&'f str> {
-    let apart = names(findings);
+/// Models that are included in means.
+fn models_in_means<'f>(findings: &'f Findings<'_>) -> Vec<&'f str> {
+    let excluded = excluded_names(findings);
     pool(&findings.grid)
         .into_iter()
-        .filter(|model| !apart.contains(model) && !is_reference(model))
+        .filter(|model| !excluded.contains(model) && !is_reference(model))
         .collect()
 }
 
-/// The accuracy of a subject, and of others on the same questions.
-struct OnSameQuestions {
+/// Accuracies of a subject and of other models on the same questions, at one level.
+struct SameQuestionAccuracy {
     level: AxisLevel,
+    /// Accuracy of the subject.
     own: Estimate,
-    /// Mean of the models that answered some of the questions; `None` if none did.
+    /// Mean accuracy of the other models that answered any of the questions; `None` if none did.
     others: Option<f64>,
-    /// Number of "cannot tell" replies.
+    /// Number of the subject's "cannot tell" replies.
     cannot_tell: usize,
 }
 
-impl OnSameQuestions {
+impl SameQuestionAccuracy {
     fn new(
         findings: &Findings<'_>,
         name: &str,
@@ -84,32 +86,34 @@ impl OnSameQuestions {
         let find = |model: &str| {
             grid.find_up_to_group(&ModelInCondition::with_images(model, level, variant, None))
         };
-        let own = find(name)?;
+        let subject = find(name)?;
         let cell = findings
             .summary
-            .cell(&grid.subjects[own], None, ParsingMode::Strict)?;
+            .cell(&grid.subjects[subject], None, ReadingMode::Strict)?;
         let answered: Vec<usize> = (0..grid.items.len())
-            .filter(|item| grid.result(own, *item).is_reply())
+            .filter(|item| grid.result(subject, *item).is_reply())
             .collect();
-        let shares: Vec<f64> = others
+        let other_accuracies: Vec<f64> = others
             .iter()
             .filter_map(|model| accuracy(grid, find(model)?, &answered))
             .collect();
         let cannot_tell = answered
             .iter()
-            .filter_map(|item| grid.trial(own, *item)?.strict()?.why)
-            .filter(|why| *why == UnreadReason::CannotTell);
+            .filter_map(|item| grid.trial(subject, *item)?.strict()?.why)
+            .filter(|why| *why == UnreadReason::CannotTell)
+            .count();
         Some(Self {
             level,
             own: cell.accuracy?,
-            others: (!shares.is_empty()).then(|| shares.iter().sum::<f64>() / shares.len() as f64),
-            cannot_tell: cannot_tell.count(),
+            others: (!other_accuracies.is_empty())
+                .then(|| other_accuracies.iter().sum::<f64>() / other_accuracies.len() as f64),
+            cannot_tell,
         })
     }
 }
 
-/// Share of right replies of a subject to the questions of some items; `None` without a reply. The same question may be asked several
-/// times, and of different people.
+/// Share of right replies of a subject to the questions of `items`; `None` without a reply. Several items may share a question, for
+/// instance one item for each person, so items are matched by question.
 fn accuracy(grid: &Grid<'_>, subject: usize, items: &[usize]) -> Option<f64> {
     let asked: BTreeSet<_> = items
         .iter()
@@ -123,10 +127,10 @@ fn accuracy(grid: &Grid<'_>, subject: usize, items: &[usize]) -> Option<f64> {
             right += usize::from(item.is_right(chosen));
         }
     }
-    (replies > 0).then(|| f64::from(right as u32) / replies as f64)
+    (replies > 0).then(|| right as f64 / replies as f64)
 }
 
-/// The sentence about a variant; `None` if the subject answered nothing there.
+/// Sentence about a subject at L0 and at the darkest level of a variant; `None` if it answered at neither.
 fn sentence(
     findings: &Findings<'_>,
     name: &str,
@@ -142,28 +146,28 @@ fn sentence(
         })
         .filter_map(|subject| subject.level)
         .max();
-    let found: Vec<OnSameQuestions> = [Some(AxisLevel::L0), darkest]
+    let accuracies: Vec<SameQuestionAccuracy> = [Some(AxisLevel::L0), darkest]
         .into_iter()
         .flatten()
-        .filter_map(|level| OnSameQuestions::new(findings, name, others, level, variant))
+        .filter_map(|level| SameQuestionAccuracy::new(findings, name, others, level, variant))
         .collect();
-    if found.is_empty() {
+    if accuracies.is_empty() {
         return None;
     }
     let mut numbers = Numbers::new(findings.unit);
-    let (mut own, mut other_shares, mut details) = (Vec::new(), Vec::new(), Vec::new());
-    for same in &found {
-        let level = same.level;
-        let percent = numbers.percent(&format!("{level}"), same.own.value);
-        own.push(format!("{percent} % at {level}"));
-        if let Some(others) = same.others {
+    let (mut own_shares, mut other_shares, mut details) = (Vec::new(), Vec::new(), Vec::new());
+    for accuracy in &accuracies {
+        let level = accuracy.level;
+        let percent = numbers.percent(&format!("{level}"), accuracy.own.value);
+        own_shares.push(format!("{percent} % at {level}"));
+        if let Some(others) = accuracy.others {
             let percent = numbers.percent(&format!("others {level}"), others);
             other_shares.push(format!("{percent} %"));
         }
-        let low = numbers.percent(&format!("low {level}"), same.own.low);
-        let high = numbers.percent(&format!("high {level}"), same.own.high);
-        let n = numbers.count(&format!("n {level}"), same.own.n);
-        let cannot_tell = match same.cannot_tell {
+        let low = numbers.percent(&format!("low {level}"), accuracy.own.low);
+        let high = numbers.percent(&format!("high {level}"), accuracy.own.high);
+        let n = numbers.count(&format!("n {level}"), accuracy.own.n);
+        let cannot_tell = match accuracy.cannot_tell {
             0 => String::new(),
             count => format!(
                 ", {} “I cannot tell”",
@@ -172,7 +176,9 @@ fn sentence(
         };
         details.push(format!("{level} [{low}, {high}], n = {n}{cannot_tell}"));
     }
-    let is_dark = found.iter().any(|same| same.level != AxisLevel::L0);
+    let is_dark = accuracies
+        .iter()
+        .any(|accuracy| accuracy.level != AxisLevel::L0);
     let place = if is_dark {
         format!("{}, ", light(variant, None))
     } else {
@@ -192,7 +198,7 @@ fn sentence(
     let text = format!(
         "{}{name}: {}{comparison}.",
         capitalised(&place),
-        own.join(", ")
+        own_shares.join(", ")
     );
     let people = if grid.listing.is_people(name) {
         "people; "

@@ -1,4 +1,4 @@
-//! Text formatting of names and numbers in reports: [`light`], [`family`], [`percent`] and others; [`words`] formats any table cell.
+//! Formatting of names and numbers in reports, such as [`family`] and [`percent`]; [`words`] formats any table cell.
 
 use crate::text::table::{ColumnKind, TableCell};
 use crate::types::{EnhancerName, Family, Variant};
@@ -10,7 +10,7 @@ pub(crate) fn light(variant: &Variant, enhancer: Option<&EnhancerName>) -> Strin
     light_with(variant, enhancer.map(EnhancerName::as_str))
 }
 
-/// Title of a variant and an enhancer given by any display name. The group of runs comes last.
+/// Title of a variant and its enhancer, like [`light`], with a display name for the enhancer. A group of runs is appended.
 pub(crate) fn light_with(variant: &Variant, enhancer: Option<&str>) -> String {
     let (title, group) = (variant.title(), variant.group_suffix());
     match enhancer {
@@ -19,7 +19,7 @@ pub(crate) fn light_with(variant: &Variant, enhancer: Option<&str>) -> String {
     }
 }
 
-/// Display name of a family: the paper's name for its five families, the family's own name for others.
+/// Display name of a question family: the paper's name for its five families, the family's own name for others. `None` is all families.
 pub(crate) fn family(family: Option<&Family>) -> &str {
     match family {
         None => "all families",
@@ -72,7 +72,7 @@ pub(crate) fn names_enhancer(text: &str, enhancer: &str) -> bool {
     text.split([' ', '+']).any(|word| word == enhancer)
 }
 
-/// A difference of shares in percentage points, with its sign and one decimal; zero has no sign.
+/// A difference of shares (−1 to 1) in percentage points, with its sign and one decimal; zero has no sign.
 pub(crate) fn points(difference: f64) -> String {
     let text = format!("{:+.1}", 100.0 * difference);
     match &*text {
@@ -95,7 +95,7 @@ pub(crate) fn p(value: f64) -> String {
     }
 }
 
-/// Interval of an exposure drop in EV, such as `1.2 to 3.4`; `–` if even its lower end is infinite (beyond the darkest level).
+/// Interval of an exposure drop in EV, such as `1.2 to 3.4`; `–` if the lower end is infinite (beyond the darkest level).
 pub(crate) fn reach(low: f64, high: f64, darkest: f64) -> String {
     if low.is_infinite() {
         "–".to_owned()
@@ -104,7 +104,7 @@ pub(crate) fn reach(low: f64, high: f64, darkest: f64) -> String {
     }
 }
 
-/// An exposure drop in EV with one decimal; if infinite, `>` and the exposure drop of the darkest level asked.
+/// An exposure drop in EV with one decimal. An infinite drop is `>` and the drop of the darkest level asked, in EV.
 pub(crate) fn stops(value: f64, darkest: f64) -> String {
     if value.is_infinite() {
         format!("> {darkest}")
@@ -119,7 +119,7 @@ pub(crate) fn with_interval(share: Estimate) -> String {
     format!("{value} [{low}, {high}]")
 }
 
-/// Estimate of an accuracy, a score or an effect, for which [`words`] leaves out the interval; `None` for other cells.
+/// Estimate of a cell that [`words`] formats without its interval: an accuracy, a score or an effect. `None` for other cells.
 pub(crate) fn interval(kind: ColumnKind, cell: &TableCell) -> Option<Estimate> {
     match (kind, cell) {
         (
@@ -134,8 +134,7 @@ pub(crate) fn interval(kind: ColumnKind, cell: &TableCell) -> Option<Estimate> {
     }
 }
 
-/// Largest distances from an estimate down and up to the ends of its interval, in percentage points, such as `−7.7 +7.1`; empty
-/// without estimates.
+/// Largest lower and upper error bars of several estimates, in percentage points, such as `−7.7 +7.1`; empty without estimates.
 pub(crate) fn widest_reach_of(shares: impl Iterator<Item = Estimate>) -> String {
     shares
         .map(|share| [share.value - share.low, share.high - share.value])
@@ -191,7 +190,7 @@ fn format_number(kind: ColumnKind, number: f64) -> String {
     }
 }
 
-/// An estimate with its interval, or without in columns of kind `Percent` and `Accuracy`.
+/// An estimate with its interval; columns of kind `Percent` and `Accuracy` have no interval.
 fn format_estimate(kind: ColumnKind, estimate: Estimate) -> String {
     let [value, low, high] =
         [estimate.value, estimate.low, estimate.high].map(|number| format_number(kind, number));
@@ -201,7 +200,7 @@ fn format_estimate(kind: ColumnKind, estimate: Estimate) -> String {
     }
 }
 
-/// The first of some names, at most `most`, and the number of the others: `a, b and 3 more`.
+/// Lists up to `most` names and the number of the remaining ones: `a, b and 3 more`.
 pub(crate) fn first_names<S: AsRef<str>>(names: &[S], most: usize) -> String {
     let (first, others) = names.split_at(names.len().min(most));
     let first = first

@@ -10,7 +10,9 @@ use crate::files::reading;
 use crate::types::questions::letter;
 use crate::types::{Choices, Digest, Family, FrameId, Question, QuestionId, View};
 
+/// Template for questions with the image.
 const CHOICE: &str = "choice.txt";
+/// Template for questions without the image.
 const BLIND: &str = "blind.txt";
 
 /// Prompt templates: the built-in ones of `prompts/`, or the user's.
@@ -32,7 +34,8 @@ impl Prompts {
     /// Reads the prompts in a folder; the built-in prompts replace missing ones.
     ///
     /// # Errors
-    /// If the folder has no prompt or contains another file, or if a template is invalid or omits the question or a choice.
+    /// If the folder has no prompt, if it contains a file that is not a prompt, README.md or a hidden file, or if a template is invalid or
+    /// omits the question or a choice.
     pub fn load(dir: &Path) -> Result<Self> {
         let mut sources = Sources::default();
         let mut found = false;
@@ -93,8 +96,7 @@ impl Prompts {
     /// Renders the prompt for one question. The texts of the question and the choices are inserted unchanged.
     ///
     /// # Errors
-    /// If the template fails, or if the question or a choice is missing in the prompt: such a prompt would cost money and measure
-    /// nothing.
+    /// If the template fails, or if the prompt omits the question or a choice: its reply would cost money and measure nothing.
     pub fn render(&self, view: View, question: &Question) -> Result<String> {
         let name = match view {
             View::Image => CHOICE,
@@ -152,7 +154,7 @@ fn prompt_error(name: &str, problem: impl std::fmt::Display) -> Error {
     }
 }
 
-/// Question whose texts occur in no template by chance.
+/// Question that checks templates: its texts are so unusual that no template contains them by chance.
 fn sample_question() -> Result<Question> {
     let texts = (1..=5).map(|i| format!("sample-choice-{i}-of-5")).collect();
     Ok(Question {
@@ -224,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_replaces_its_prompts_only() {
+    fn missing_prompts_stay_built_in() {
         let own = "Q: {{ question }}\r\n{% for c in choices %}({{ c.letter }}) {{ c.text }}\r\n{% endfor %}";
         let prompts = load(&[("choice.txt", own), ("README.md", "x"), (".swp", "x")]).unwrap();
         let asked = question("Red?", &["yes", "no"]);

@@ -27,18 +27,18 @@ use super::sizing::{
     TiledImage, Tiling, count_image, count_planned, not_local, seams_differ, sizes_not_found,
 };
 
-/// Adaptation of an image to a model that accepts only another, fixed size.
+/// Method to fit an image to a model that accepts a single size.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Fitting {
     /// Pad the image or cut it into tiles. Refused if a pixel of the output depends on distant pixels.
     #[default]
     Tiles,
-    /// Resize the image to the fixed size, and the result back (`--llie-options resize`). This changes the aspect ratio in between and
-    /// blurs the image.
+    /// Resize the image to the fixed size, and the result back (`--llie-options resize`). The model sees a distorted image, and the
+    /// result is blurred.
     Resize,
 }
 
-/// Caveat about a graph that draws random numbers; `None` without random operators.
+/// Warning about a graph that draws random numbers; `None` without random operators.
 fn random_remark(random: &RandomOperators) -> Option<String> {
     let names: Vec<&str> = random.names.iter().map(String::as_str).collect();
     (!names.is_empty()).then(|| {
@@ -49,10 +49,10 @@ fn random_remark(random: &RandomOperators) -> Option<String> {
     })
 }
 
-/// Side, in pixels, of an image for which memory should suffice with any model; chosen.
+/// Side, in pixels, of a test image that should fit in memory with any model; chosen.
 const SMALL_SIDE: usize = 64;
 
-/// Result of one attempt to enhance an image: the image, or a failure that another input size may avoid.
+/// Result of one attempt to enhance an image: the enhanced image, or a failed run that may succeed at another input size.
 type Attempt = std::result::Result<Rgb, RunFailure>;
 
 /// A loaded enhancement model.
@@ -67,12 +67,13 @@ pub struct Enhancer {
     fitting: Fitting,
     max_side: Option<NonZeroUsize>,
     search: SizeSearch,
-    /// Heights and widths of images that the model refused unpadded.
+    /// Heights and widths of images on which the model failed without padding.
     refused: BTreeSet<[usize; 2]>,
+    /// Reach of an output pixel into the input, and alignment of tiles; measured on first use.
     context: Context,
     memory: MemoryCheck,
     log: SizeLog,
-    /// Number of images in a row that exceeded the limit of time or memory.
+    /// Number of consecutive images that exceeded the time or memory limit.
     consecutive_overruns: usize,
     description: Description,
     usage: Usage,
@@ -81,11 +82,11 @@ pub struct Enhancer {
 }
 
 impl Enhancer {
-    /// Loads a model from the bytes in `file`, so that the digest belongs to the bytes that run. `threads` is the number of threads for
-    /// one image, by default the number of cores.
+    /// Loads a model from the bytes in `file`, which its digest identifies; a model with external data is read again from its path.
+    /// `threads` is the number of threads for one image, by default the number of cores.
     ///
     /// # Errors
-    /// If ONNX Runtime refuses the model, or the image cannot be identified among its inputs or outputs.
+    /// If ONNX Runtime refuses the model, or if its image input or image output cannot be identified.
     pub fn open(file: ModelFile, runtime: &Runtime, threads: Option<NonZeroUsize>) -> Result<Self> {
         Self::open_within(file, runtime, threads, LoadLimits::NONE)
     }
@@ -126,7 +127,7 @@ impl Enhancer {
             .unread_images()
             .into_iter()
             .chain(random_remark(&random))
-            .map(|words| sidecar::insert_sidecar_name(&words, &file.path))
+            .map(|remark| sidecar::insert_sidecar_name(&remark, &file.path))
             .collect();
         let enhancer = Self {
             argument: file.argument,
@@ -163,20 +164,20 @@ impl Enhancer {
         Self { tiling, ..self }
     }
 
-    /// Sets how images of other sizes reach a model with a fixed size; the default is [`Fitting::Tiles`].
+    /// Sets how images of other sizes are fitted to a model with a fixed size; the default is [`Fitting::Tiles`].
     #[must_use]
     pub fn with_fitting(self, fitting: Fitting) -> Self {
         Self { fitting, ..self }
     }
 
-    /// Sets the time limit for one image. Without this call there is none; the program's flag defaults to 600 s.
+    /// Sets the time limit for one image; the default is no limit, but 600 s in the command-line program.
     #[must_use]
     pub fn with_time_limit(mut self, limit: TimeLimit) -> Self {
         self.graph.limit_time(limit);
         self
     }
 
-    /// Sets the limit of the process's memory while the model runs. Without this call there is none.
+    /// Sets a limit on the memory of the whole process while the model runs; the default is no limit.
     #[must_use]
     pub fn with_memory_limit(mut self, limit: MemoryLimit) -> Self {
         self.graph.limit_memory(limit);
@@ -201,7 +202,7 @@ impl Enhancer {
         &self.log
     }
 
-    /// Table, as text, of the model's input and output convention, with the source of each value.
+    /// Text table of the model's input and output conventions, with the source of each value.
     #[must_use]
     pub fn describe(&self) -> String {
         self.description
@@ -216,12 +217,12 @@ impl Enhancer {
 
     /// Enhances an image; the result has the same size.
     ///
-    /// For a model with a fixed size, the image is padded or cut into tiles of that size. If the model fails at the image's size, the
-    /// accepted sizes are searched by trial, once per model.
+    /// For a model with a fixed size, the image is padded, tiled or resized, as chosen by [`Self::with_fitting`]. If the model fails at
+    /// the image's size, the sizes that it accepts are searched by trial, once per model.
     ///
     /// # Errors
-    /// If the model fails on this image, returns another size or values that are NaN or out of range, if tiles differ where they
-    /// overlap, or if a limit of memory or time is exceeded.
+    /// If the model fails on this image, if its output has another size or values that are NaN or out of range, if tiles differ where
+    /// they overlap, or if a memory or time limit is exceeded.
     pub fn enhance(&mut self, image: &Rgb) -> Result<Rgb> {
         if self.consecutive_overruns >= MAX_CONSECUTIVE_OVERRUNS {
             return Err(self.error(format!(
@@ -248,7 +249,7 @@ impl Enhancer {
         attempt.map_err(|failure| self.run_error(&failure, size))
     }
 
-    /// Sizes that the model accepts, as far as graph, convention and earlier trials show, for an image of this height and width.
+    /// Size rule for an image of this height and width, from the graph, the convention and earlier trials.
     fn rule(&self, size: [usize; 2]) -> SizeRule {
         let signature = &self.graph.signature;
         let fixed = [signature.height, signature.width];
@@ -283,8 +284,8 @@ impl Enhancer {
             (Some(found), None) => {
                 self.refused.insert(size);
                 if is_new {
-                    let words = sidecar::insert_sidecar_name(&found.message(), &self.path);
-                    tracing::warn!("{}: {words}", self.path.display());
+                    let advice = sidecar::insert_sidecar_name(&found.message(), &self.path);
+                    tracing::warn!("{}: {advice}", self.path.display());
                 }
                 self.attempt(image, self.rule(size))
             }
@@ -292,8 +293,8 @@ impl Enhancer {
         }
     }
 
-    /// Enhances an image padded to the first multiple at which the model runs. This helps with images that are too small for a model
-    /// that accepts any larger size.
+    /// Enhances an image padded to the first of [`MULTIPLES`] at which the model runs. Some models accept any size above a minimum, and
+    /// fail on smaller images.
     fn attempt_padded(&mut self, image: &Rgb, failure: RunFailure) -> Result<Attempt> {
         let size = [image.height(), image.width()];
         let mut tried = vec![size];
@@ -313,7 +314,7 @@ impl Enhancer {
         Ok(Err(failure))
     }
 
-    /// Enhances an image whose input size follows `rule`.
+    /// Enhances an image at an input size that `rule` allows.
     fn attempt(&mut self, image: &Rgb, mut rule: SizeRule) -> Result<Attempt> {
         let size = [image.height(), image.width()];
         if let Some(smaller) = rule.reduced_size(size, self.max_side) {
@@ -321,8 +322,8 @@ impl Enhancer {
             self.log.reduced += usize::from(attempt.is_ok());
             return Ok(attempt);
         }
-        let must_fit = rule.needs_locality(size);
-        if must_fit && self.fitting == Fitting::Resize {
+        let needs_fitting = rule.needs_locality(size);
+        if needs_fitting && self.fitting == Fitting::Resize {
             let attempt = self.attempt_resized(image, rule, rule.run_size(size))?;
             self.log.resized += usize::from(attempt.is_ok());
             return Ok(attempt);
@@ -331,7 +332,7 @@ impl Enhancer {
         if !rule.takes_any_size() {
             self.check_memory(rule, rule.run_size(size), size)?;
         }
-        if must_fit {
+        if needs_fitting {
             let found = self.context.measure(&self.graph, rule)?;
             self.log.reach = self.context.reach();
             context = found.map_err(|why| self.error(not_local(rule, size, &why)))?;
@@ -356,7 +357,7 @@ impl Enhancer {
         self.attempt_planned(image, rule, &plan)
     }
 
-    /// Multiple of pixels at which tiles must start: the stated one, else measured by trial.
+    /// Number of pixels at whose multiples tiles must start: from `rule` if it is above 1, otherwise measured by trial.
     fn alignment(&mut self, rule: SizeRule, tile: [usize; 2], context: usize) -> Result<usize> {
         if rule.multiple > 1 {
             return Ok(rule.multiple);
@@ -364,23 +365,23 @@ impl Enhancer {
         let is_new = self.context.lacks_alignment();
         let found = self.context.measure_alignment(&self.graph, tile, context)?;
         if is_new && found > 1 {
-            let words = format!(
+            let advice = format!(
                 "its tiles must start at multiples of {found} pixels (found by trial); to confirm, {ADD}: `multiple = {found}`"
             );
-            let words = sidecar::insert_sidecar_name(&words, &self.path);
-            tracing::warn!("{}: {words}", self.path.display());
+            let advice = sidecar::insert_sidecar_name(&advice, &self.path);
+            tracing::warn!("{}: {advice}", self.path.display());
         }
         Ok(found)
     }
 
-    /// Refuses a large run on an input of height and width `fed` that would need more memory than is available.
-    fn check_memory(&mut self, rule: SizeRule, fed: [usize; 2], size: [usize; 2]) -> Result<()> {
-        let checked = self.memory.run(&self.graph, rule, fed, size)?;
+    /// Fails if a large run needs more memory than is available. The input has height and width `input`, the image `size`.
+    fn check_memory(&mut self, rule: SizeRule, input: [usize; 2], size: [usize; 2]) -> Result<()> {
+        let checked = self.memory.run(&self.graph, rule, input, size)?;
         self.graph.restart_clock();
         checked.map_err(|problem| self.error(problem))
     }
 
-    /// Enhances an image tile by tile.
+    /// Enhances an image tile by tile, as planned.
     fn attempt_planned(&mut self, image: &Rgb, rule: SizeRule, plan: &SizePlan) -> Result<Attempt> {
         let size = [image.height(), image.width()];
         let mut canvas = TiledImage::new(plan.geometry.area);
@@ -402,11 +403,16 @@ impl Enhancer {
         Ok(Ok(enhanced))
     }
 
-    /// Resizes an image to `fed`, enhances it, and resizes the result back.
-    fn attempt_resized(&mut self, image: &Rgb, rule: SizeRule, fed: [usize; 2]) -> Result<Attempt> {
-        self.check_memory(rule, fed, [image.height(), image.width()])?;
+    /// Resizes an image to height and width `input`, enhances it, and resizes the result back.
+    fn attempt_resized(
+        &mut self,
+        image: &Rgb,
+        rule: SizeRule,
+        input: [usize; 2],
+    ) -> Result<Attempt> {
+        self.check_memory(rule, input, [image.height(), image.width()])?;
         let planes = Planes::from_rgb(image)
-            .resized(fed[0], fed[1])
+            .resized(input[0], input[1])
             .map_err(|e| self.error(e))?;
         let enhanced = match self.graph.run_planes(&planes)? {
             RunResult::Output(planes) => planes,
@@ -435,7 +441,7 @@ impl Enhancer {
         }
     }
 
-    /// Error for an image of this size, after `failure` at the last of the tried sizes.
+    /// Error for a failed run on an image of height and width `size`.
     fn run_error(&self, failure: &RunFailure, size: [usize; 2]) -> Error {
         let rule = self.rule(size);
         self.error(match failure {
@@ -455,7 +461,7 @@ impl Enhancer {
         })
     }
 
-    /// True if an allocation of the same number of bytes also fails for a small image.
+    /// True if a run on a small image fails to allocate the same number of bytes.
     fn fails_when_small(&self, rule: SizeRule, bytes: Option<u64>) -> bool {
         let size = rule.run_size([SMALL_SIDE; 2]);
         self.graph.restart_clock();
@@ -468,7 +474,7 @@ impl Enhancer {
         }
     }
 
-    /// Error about this model; `problem` follows the file's name.
+    /// Error about this model; the message is the file's name followed by `problem`.
     pub(super) fn error(&self, problem: impl AsRef<str>) -> Error {
         Error::Enhancer {
             path: self.path.clone(),

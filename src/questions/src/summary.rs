@@ -1,4 +1,4 @@
-//! Statistics of a set of questions, including those of the paper's figure: [`QuestionSummary`].
+//! Statistics of a set of questions, including the statistics in the paper's figure: [`QuestionSummary`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,10 +11,10 @@ use super::rules::RuleBook;
 use super::statistics::FrameStatistics;
 use darkqa_ground::types::{Digest, Family};
 
-/// The schema of the summary as JSON.
+/// Schema of the JSON summary.
 const SCHEMA: &str = "darkqa.questions/1";
 
-/// Statistics of a set of questions. A share is given as a pair of counts.
+/// Statistics of a set of questions. Shares are stored as counts.
 #[derive(Debug, Serialize)]
 pub struct QuestionSummary {
     schema: &'static str,
@@ -36,7 +36,7 @@ pub struct QuestionSummary {
     pub questions: usize,
     /// Numbers of candidates by outcome, for each family.
     pub candidates: BTreeMap<Family, CandidateCounts>,
-    /// Number of frames by the number of questions asked of a frame.
+    /// Number of frames by their number of questions.
     pub per_frame: BTreeMap<usize, usize>,
     /// Number of questions by family and answer.
     pub answers: BTreeMap<Family, BTreeMap<String, usize>>,
@@ -54,21 +54,21 @@ pub struct QuestionSummary {
     pub room_agreement: [usize; 2],
     /// Number of questions by the gap between the two nearest objects, in mm, rounded down to a multiple of 250.
     pub gaps: BTreeMap<u64, usize>,
-    /// Number of questions that repeat another one of their scene, with the same text and answer.
+    /// Number of questions with the same scene, text and answer as an earlier one.
     pub repeats: usize,
-    /// Number of pixels of each map number that the label space does not have.
+    /// Number of pixels by label ID, for IDs in the maps that the label space does not define.
     pub unknown: BTreeMap<u16, u64>,
-    /// Scores of answering without the image, by family; "all" is the total.
+    /// Baselines that ignore the image, by family; "all" is the total.
     pub baselines: BTreeMap<String, Baselines>,
 }
 
-/// Numbers of a family's candidates, by outcome.
+/// Counts of a family's candidate questions, by outcome.
 #[derive(Debug, Default, Serialize)]
 pub struct CandidateCounts {
     /// Number of candidates that the rules accept.
     pub viable: u64,
     pub asked: u64,
-    /// Number of viable candidates that lost to another question of their family and frame.
+    /// Number of viable candidates in whose place another question of the same family and frame was asked.
     pub not_chosen: u64,
     /// Number of questions that a person has rejected.
     pub rejected: u64,
@@ -79,7 +79,7 @@ pub struct CandidateCounts {
     pub rejections: BTreeMap<Reason, u64>,
 }
 
-/// Amounts of one class in a set of frames and questions.
+/// Counts of one class in a set of frames and questions.
 #[derive(Debug, Default, Serialize)]
 pub struct ClassCoverage {
     /// Number of pixels over all frames.
@@ -92,25 +92,26 @@ pub struct ClassCoverage {
     pub questions: u64,
 }
 
-/// Amounts of one room type in a set of frames and questions.
+/// Counts of one room type in a set of frames and questions.
 #[derive(Debug, Default, Serialize)]
 pub struct RoomCoverage {
     /// Number of frames that show this type of room.
     pub frames: usize,
-    /// Number of room-type questions with this answer.
+    /// Number of room-type questions whose right answer is this type.
     pub questions: usize,
 }
 
-/// Scores of answering without the image, as numbers of right answers or their expected values.
+/// Baselines that ignore the image. Each score is a number, or expected number, of right answers.
 #[derive(Debug, Default, Serialize)]
 pub struct Baselines {
     pub questions: usize,
-    /// Expected number of right answers of a uniform guess.
+    /// Expected number of right answers if every reply is a uniform guess.
     pub chance: f64,
     /// Number of right answers if every reply is the most common answer of the family.
     pub majority: usize,
-    /// Expected number of right answers if every reply is the most common answer to the same text in other scenes, else the most common
-    /// one of the family in other scenes, else a guess. A model can know these answers without the image.
+    /// Expected number of right answers if a model knows the answers in other scenes. It replies with the most common answer to the same
+    /// text. If no other scene has that text, it replies with the most common answer of the family; if no other scene has the family, it
+    /// guesses.
     pub prior: f64,
 }
 
@@ -151,7 +152,7 @@ impl QuestionSummary {
             choices: count(asked, |asked| asked.question.choices.len()),
             polarity: BTreeMap::new(),
             classes: coverage(frames, asked),
-            rooms: rooms(generated),
+            rooms: count_room_frames(generated),
             room_agreement: room_agreement(frames, generated, request.rules.book()),
             gaps: BTreeMap::new(),
             repeats: 0,
@@ -176,6 +177,7 @@ impl QuestionSummary {
         summary
     }
 
+    /// Counts one question by answer, polarity, gap and room.
     fn add(&mut self, asked: &GeneratedQuestion) {
         let question = &asked.question;
         let answers = self.answers.entry(question.family.clone()).or_default();
@@ -234,15 +236,15 @@ fn count<'a, K: Ord>(
     counts
 }
 
-/// Expected number of right answers of uniform guesses, given the number of questions by the number of choices.
-fn expected_by_chance(sizes: &BTreeMap<usize, usize>) -> f64 {
-    sizes
+/// Expected number of right answers of uniform guesses. `questions` maps a number of choices to a number of questions.
+fn expected_by_chance(questions: &BTreeMap<usize, usize>) -> f64 {
+    questions
         .iter()
-        .map(|(size, count)| *count as f64 / *size as f64)
+        .map(|(choices, count)| *count as f64 / *choices as f64)
         .sum()
 }
 
-/// Amounts of each class in frames and questions.
+/// Counts of each class in frames and questions.
 fn coverage(
     frames: &[FrameStatistics],
     asked: &[GeneratedQuestion],
@@ -278,7 +280,7 @@ fn room_agreement(
     let signs: BTreeMap<_, _> = generated
         .rooms
         .iter()
-        .map(|(name, signs)| (name, signs))
+        .map(|(frame, signs)| (frame, signs))
         .collect();
     let mut agreement = [0, 0];
     for frame in frames {
@@ -292,8 +294,8 @@ fn room_agreement(
     agreement
 }
 
-/// Number of frames of each classified room type.
-fn rooms(generated: &Generated) -> BTreeMap<String, RoomCoverage> {
+/// Number of frames of each classified room type; the numbers of questions are 0.
+fn count_room_frames(generated: &Generated) -> BTreeMap<String, RoomCoverage> {
     let mut rooms: BTreeMap<String, RoomCoverage> = BTreeMap::new();
     for room in generated
         .rooms
@@ -316,14 +318,16 @@ fn baselines(asked: &[GeneratedQuestion]) -> BTreeMap<String, Baselines> {
     }
     let mut all: BTreeMap<String, Baselines> = BTreeMap::new();
     let mut total = Baselines::default();
-    for (family, list) in families {
-        let answers = count(list.iter().copied(), GeneratedQuestion::answer);
-        let sizes = count(list.iter().copied(), |asked| asked.question.choices.len());
+    for (family, questions) in families {
+        let answers = count(questions.iter().copied(), GeneratedQuestion::answer);
+        let by_choices = count(questions.iter().copied(), |asked| {
+            asked.question.choices.len()
+        });
         let baselines = Baselines {
-            questions: list.len(),
-            chance: expected_by_chance(&sizes),
+            questions: questions.len(),
+            chance: expected_by_chance(&by_choices),
             majority: answers.values().copied().max().unwrap_or(0),
-            prior: prior(&list),
+            prior: prior(&questions),
         };
         total.questions += baselines.questions;
         total.chance += baselines.chance;
@@ -336,10 +340,10 @@ fn baselines(asked: &[GeneratedQuestion]) -> BTreeMap<String, Baselines> {
 }
 
 /// Computes [`Baselines::prior`] for the questions of one family.
-fn prior(list: &[&GeneratedQuestion]) -> f64 {
-    // Counts by text, answer and scene. The empty text stands for all questions of the family.
+fn prior(questions: &[&GeneratedQuestion]) -> f64 {
+    // Counts by text, answer and scene. The empty text is the key for all questions of the family.
     let mut counts: BTreeMap<&str, BTreeMap<&str, BTreeMap<&str, usize>>> = BTreeMap::new();
-    for asked in list {
+    for asked in questions {
         for text in ["", &asked.question.text] {
             let scenes = counts
                 .entry(text)
@@ -350,7 +354,7 @@ fn prior(list: &[&GeneratedQuestion]) -> f64 {
         }
     }
     let (mut right, mut guesses) = (0_usize, BTreeMap::<usize, usize>::new());
-    for asked in list {
+    for asked in questions {
         let most_common = [&*asked.question.text, ""].into_iter().find_map(|text| {
             counts
                 .get(text)

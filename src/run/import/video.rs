@@ -57,7 +57,7 @@ pub(crate) fn import(args: &VideoArgs, progress: &Progress) -> Result<Outcome> {
         }
         (_, duration) => duration.unwrap_or(0.0),
     };
-    let place = args.file.display().to_string();
+    let path = args.file.display().to_string();
     let drive = drive_name(&args.file);
     let mut sampler = args.sampling.sampler(duration);
     let mut stretches = Stretches::new(args.written.stretch);
@@ -80,19 +80,19 @@ pub(crate) fn import(args: &VideoArgs, progress: &Progress) -> Result<Outcome> {
                 break;
             }
         };
-        let at = stretches.place(&mut clock, frame.time, frame.time);
+        let place = stretches.place(&mut clock, frame.time, frame.time);
         let name = format!("{seen:06}");
         seen += 1;
-        let before = last as usize;
+        let shown_seconds = last as usize;
         last = last.max(seconds(frame.time));
-        bar.advance(last as usize - before);
-        let is_taken = sampler.is_due(at)
+        bar.advance(last as usize - shown_seconds);
+        let is_chosen = sampler.is_due(place)
             && (!sampler.compares_pixels() || sampler.has_changed(Thumbnail::new(&frame.image)));
-        if is_taken {
+        if is_chosen {
             let frame = ChosenFrame {
-                topic: place.clone(),
+                topic: path.clone(),
                 name,
-                place: at,
+                place,
                 log_time: frame.time,
                 source: FrameSource::Image(frame.image),
             };
@@ -100,20 +100,20 @@ pub(crate) fn import(args: &VideoArgs, progress: &Progress) -> Result<Outcome> {
         }
     }
     drop(bar);
-    warn_of_missed(&sampler, &place);
+    warn_of_missed(&sampler, &path);
     let problem = match problem {
         Some(problem) => Some(format!("{problem}; frames up to there are kept")),
         None => frames
             .damage()
-            .map(|problem| format!("{place}: {problem}; its frames are kept")),
+            .map(|problem| format!("{path}: {problem}; its frames are kept")),
     };
     let is_whole = problem.is_none();
     let early = early_end(&video, last, args.sampling.interval());
-    if let Some(warning) = problem.or(early.map(|early| format!("{place}: {early}"))) {
+    if let Some(warning) = problem.or(early.map(|early| format!("{path}: {early}"))) {
         tracing::warn!("{warning}");
     }
     let info = args.written.info("video", &drive);
-    let scenes = writer.finish(&place, &info)?;
+    let scenes = writer.finish(&path, &info)?;
     let failed = writer.warn_of_failures();
     let mut output = summary(
         out,
@@ -136,10 +136,11 @@ pub(crate) fn import(args: &VideoArgs, progress: &Progress) -> Result<Outcome> {
     ))
 }
 
-/// Seconds at the end of a video that may have no frame, because the sound may be longer (chosen).
+/// Seconds without frames that are normal at the end of a video, where the sound may be longer than the picture; chosen.
 const MAX_GAP: f64 = 2.0;
 
-/// The warning about a video whose frames, one every `interval` seconds, end long before its stated duration.
+/// Warning that the frames of a video end long before its stated duration; `None` if they do not or the duration is unknown. `last` is
+/// the time of the last frame and `interval` the time between frames, both in seconds.
 fn early_end(video: &Video, last: f64, interval: f64) -> Option<String> {
     let duration = video.duration?;
     (duration - last > interval + MAX_GAP).then(|| {

@@ -27,8 +27,8 @@ struct Axes {
 }
 
 impl Axes {
-    /// Axes of a tensor of the image's size; `None` for scalars and vectors. The layout is one with one or three channels, preferably that
-    /// of the image.
+    /// Axes of a tensor with the image's size; `None` for scalars, vectors and ranks that no layout has. A layout with one or three
+    /// channels is preferred, then the layout of the image.
     fn for_port(port: &Port, image: TensorLayout) -> Option<Self> {
         if port.is_scalar() || vector_length(port).is_some() {
             return None;
@@ -58,16 +58,16 @@ impl Axes {
 
     /// Dimensions other than channels, rows and columns.
     fn others(self, port: &Port) -> impl Iterator<Item = &Dim> {
-        let own = [self.channels, Some(self.rows), Some(self.columns)];
+        let used = [self.channels, Some(self.rows), Some(self.columns)];
         port.dims
             .iter()
             .enumerate()
-            .filter(move |(axis, _)| !own.contains(&Some(*axis)))
+            .filter(move |(axis, _)| !used.contains(&Some(*axis)))
             .map(|(_, dim)| dim)
     }
 
     /// True if the graph fixes both height and width.
-    fn are_fixed(self, port: &Port) -> bool {
+    fn has_fixed_size(self, port: &Port) -> bool {
         [self.rows, self.columns]
             .iter()
             .all(|axis| port.dims[*axis].known().is_some())
@@ -83,10 +83,10 @@ impl Axes {
 }
 
 impl FurtherInput {
-    /// The input with the value that sidecar or preset state. `image` is the layout of the image input.
+    /// Creates the input with its value from the sidecar or preset. `image` is the layout of the image input.
     ///
     /// # Errors
-    /// If the value is missing or does not fit the port; the message follows the file's name.
+    /// If the value is missing or does not fit the port. The message is to be printed after the file's name.
     pub(crate) fn new(
         port: &Port,
         value: Option<&ExtraValue>,
@@ -95,7 +95,7 @@ impl FurtherInput {
     ) -> Result<Self, String> {
         let axes = Axes::for_port(port, image);
         if let Some(axes) = axes
-            && axes.are_fixed(port)
+            && axes.has_fixed_size(port)
             && image_takes_any_side
         {
             return Err(format!(
@@ -114,6 +114,7 @@ impl FurtherInput {
         Ok(input)
     }
 
+    /// Checks that the value fits the type and dimensions of the port.
     fn check(&self) -> Result<(), String> {
         let key = toml_key(&self.port.name);
         if let Some(axes) = self.axes
@@ -161,23 +162,25 @@ impl FurtherInput {
             }
             (ExtraValue::Noise(_), Some(_)) => Ok(()),
             (ExtraValue::From(expression), Some(axes)) => {
-                let made = expression.channels(&vec![3; expression.names().len()]);
-                match (axes.channels(&self.port), made) {
+                let result_channels = expression.channels(&vec![3; expression.names().len()]);
+                match (axes.channels(&self.port), result_channels) {
                     (None | Some(3), _) | (Some(1), 1) => Ok(()),
                     (Some(1), _) => Err(
                         "this has three channels, and it takes one; wrap the expression in mean(…) or max(…)"
                             .to_owned(),
                     ),
-                    (Some(other), _) => Err(format!("it takes {other} channels, and this has {made}")),
+                    (Some(other), _) => Err(format!(
+                        "it takes {other} channels, and this has {result_channels}"
+                    )),
                 }
             }
         }
     }
 
-    /// Checks that the input's value for a tile is a part of its value for the whole image.
+    /// Checks that the input can be computed for the tile or whole image `fed`.
     ///
     /// # Errors
-    /// For a tile, if the input is noise of a reduced size.
+    /// If `fed` is a tile and the input is noise of a reduced size, which cannot be cut into tiles.
     pub(crate) fn check_tileable(&self, fed: &FedImage<'_>) -> Result<(), String> {
         match &self.value {
             ExtraValue::Noise(noise) if noise.divide != 1 && !fed.is_whole() => Err(format!(
@@ -188,7 +191,7 @@ impl FurtherInput {
         }
     }
 
-    /// Tensor of the input for a run on an image; `None` if the sidecar's expression gives values that are not finite.
+    /// Value of the input for the tile or whole image `fed`; `None` if the sidecar's expression gives values that are not finite.
     pub(crate) fn tensor(&self, fed: &FedImage<'_>) -> Option<Tensor> {
         let Some(axes) = self.axes else {
             if let ExtraValue::List(numbers) = &self.value {
@@ -211,8 +214,8 @@ impl FurtherInput {
                 self.arrange_planes(axes, channels, size, planes)
             }
             ExtraValue::From(expression) => {
-                let dark = fed.planes();
-                let images = vec![&*dark; expression.names().len()];
+                let planes = fed.planes();
+                let images = vec![&*planes; expression.names().len()];
                 let mut image = expression.evaluate(&images, fed.size());
                 if channels == Some(3) {
                     image = image.spread();
@@ -227,7 +230,7 @@ impl FurtherInput {
         }
     }
 
-    /// Tensor of these dimensions filled with the value, if that is a single number.
+    /// Tensor of these dimensions filled with the value; `None` if the value is not a single number.
     fn constant_tensor(&self, dims: Vec<usize>) -> Option<Tensor> {
         let (ExtraValue::Number(number) | ExtraValue::Map(number)) = self.value else {
             return None;
@@ -256,7 +259,7 @@ impl FurtherInput {
         dims
     }
 
-    /// Tensor of planar samples, arranged in the order of the tensor's dimensions; `None` for a type other than floats.
+    /// Converts planar samples to the order of the tensor's dimensions; `None` if the port's type is not a float type.
     fn arrange_planes(
         &self,
         axes: Axes,
@@ -281,7 +284,7 @@ impl FurtherInput {
     }
 }
 
-/// Length of a vector: an input with fixed dimensions of which exactly one is above 1; `None` for others.
+/// Length of a vector; `None` if the port is not a vector. The dimensions of a vector are fixed, and exactly one is above 1.
 fn vector_length(port: &Port) -> Option<usize> {
     let sizes = port
         .dims
@@ -294,12 +297,12 @@ fn vector_length(port: &Port) -> Option<usize> {
 
 /// Sidecar line for a list of numbers.
 fn list_line(key: &str, length: usize) -> String {
-    let some = vec!["NUMBER"; length.min(4)].join(", ");
+    let shown = vec!["NUMBER"; length.min(4)].join(", ");
     let rest = if length > 4 { ", …" } else { "" };
-    format!("`{key} = [{some}{rest}]`")
+    format!("`{key} = [{shown}{rest}]`")
 }
 
-/// Message about an input without a value, with the sidecar lines that would state one.
+/// Message about an input without a value, with sidecar lines that would set it.
 fn missing_value_message(port: &Port, axes: Option<Axes>) -> String {
     let key = toml_key(&port.name);
     let add = format!("{ADD}, below `[extra]`:");
@@ -333,20 +336,20 @@ fn missing_value_message(port: &Port, axes: Option<Axes>) -> String {
         );
     }
     let number = known.map_or("NUMBER".to_owned(), |(value, _)| value.to_string());
-    let channels = match axes.channels(port) {
+    let extent = match axes.channels(port) {
         Some(1) => "one channel",
         Some(3) => "three channels",
         _ => "the image's size",
     };
     format!(
-        "takes {port} in addition to the image, of {channels}; {add} `{key} = {{ map = {number} }}` (one number for all pixels), `{key} = {{ noise = \"normal\", std = NUMBER, seed = 0 }}` or `{key} = {{ from = \"EXPRESSION\" }}` (of `image`)"
+        "takes {port} in addition to the image, of {extent}; {add} `{key} = {{ map = {number} }}` (one number for all pixels), `{key} = {{ noise = \"normal\", std = NUMBER, seed = 0 }}` or `{key} = {{ from = \"EXPRESSION\" }}` (of `image`)"
     )
 }
 
-/// Parts of the names of inputs that are computed from the image.
+/// Substrings in the names of inputs that are usually computed from the image.
 const ATTENTION: [&str; 4] = ["mask", "gray", "grey", "att"];
 
-/// True if an input's name suggests a map computed from the image, or noise, instead of the image itself.
+/// True if an input's name suggests noise or a map computed from the image, not the image itself.
 pub(crate) fn is_map_or_noise(name: &str) -> bool {
     let name = name.to_lowercase();
     is_attention_map(&name) || name == "z" || name.contains("noise")

@@ -1,7 +1,7 @@
-//! Check before a large run that enough memory is free: [`MemoryCheck`].
+//! Check that enough memory is free for a large run: [`MemoryCheck`].
 //!
-//! The estimate is based on the size of the input tensor, not on that of the image: a wrong multiple or fixed size in a sidecar can make
-//! the input much larger. The check is made before memory is allocated.
+//! The estimate is based on the size of the input tensor, because a wrong multiple or fixed size in a sidecar can make it much larger than
+//! the image. The check precedes the allocation.
 
 use super::memory::{self, MemoryCost, PROBE_SIDES};
 use crate::conventions::Locality;
@@ -15,7 +15,7 @@ use darkqa_ground::error::Result;
 enum Estimate {
     /// Not measured yet.
     Unknown,
-    /// Cannot be measured, so only the input and output tensors count.
+    /// Cannot be measured; a lower bound from the input and output tensors is used instead.
     Tensors,
     /// Measured on small images.
     Measured(MemoryCost),
@@ -26,21 +26,25 @@ enum Estimate {
 pub(crate) struct MemoryCheck(Estimate);
 
 impl MemoryCheck {
-    /// A check without measurements.
+    /// Creates a check without measurements.
     pub(crate) fn new() -> Self {
         Self(Estimate::Unknown)
     }
 
-    /// Checks a run with an input of height and width `fed` for an image of `size`. The inner error is a message with the needed and the
-    /// free memory, and a remedy.
+    /// Checks a run on an image. The sizes of the input and the image are heights and widths in pixels. Small inputs always pass.
+    ///
+    /// The inner error is a message with the needed memory, the free memory and a remedy.
+    ///
+    /// # Errors
+    /// The outer error comes from the runs that measure memory.
     pub(crate) fn run(
         &mut self,
         graph: &Graph,
         rule: SizeRule,
-        fed: [usize; 2],
-        size: [usize; 2],
+        input_size: [usize; 2],
+        image_size: [usize; 2],
     ) -> Result<std::result::Result<(), String>> {
-        let pixels = fed[0].saturating_mul(fed[1]);
+        let pixels = input_size[0].saturating_mul(input_size[1]);
         let Some(available) = memory::available().filter(|_| pixels > MAX_WHOLE) else {
             return Ok(Ok(()));
         };
@@ -57,15 +61,19 @@ impl MemoryCheck {
         Ok(result.map_err(|[needed, available]| {
             format!(
                 "needs about {needed:.1} GB of memory for {}, but {available:.1} GB are free; {}",
-                format_size(fed),
-                remedy(rule, fed, size)
+                format_size(input_size),
+                remedy(rule, input_size, image_size)
             )
         }))
     }
 }
 
-/// Message about a run on an image of `size` that ended because ONNX Runtime could not allocate memory.
-pub(crate) fn out_of_memory(failure: &RunFailure, rule: SizeRule, size: [usize; 2]) -> String {
+/// Message for an image on which ONNX Runtime could not allocate memory, with a remedy.
+pub(crate) fn out_of_memory(
+    failure: &RunFailure,
+    rule: SizeRule,
+    image_size: [usize; 2],
+) -> String {
     let RunFailure::NoMemory { fed, requested } = failure else {
         return failure.message();
     };
@@ -73,26 +81,26 @@ pub(crate) fn out_of_memory(failure: &RunFailure, rule: SizeRule, size: [usize; 
         format!("{} were needed at once, ", format_gigabytes(bytes))
     });
     let free = memory::available().map_or("too few GB".to_owned(), format_gigabytes);
-    let (words, remedy) = (failure.message(), remedy(rule, *fed, size));
-    format!("{words}: {requested}{free} are free; {remedy}")
+    let (message, remedy) = (failure.message(), remedy(rule, *fed, image_size));
+    format!("{message}: {requested}{free} are free; {remedy}")
 }
 
 fn format_gigabytes(bytes: u64) -> String {
     format!("{:.1} GB", bytes as f64 / 1e9)
 }
 
-/// Remedy for lack of memory in a run with an input of height and width `fed` for an image of `size`.
-fn remedy(rule: SizeRule, fed: [usize; 2], size: [usize; 2]) -> String {
+/// Remedy for a run without enough memory.
+fn remedy(rule: SizeRule, input_size: [usize; 2], image_size: [usize; 2]) -> String {
     const SMALLER: &str = "--llie-options max-side=1280 enhances a smaller image";
-    let is_much_larger = fed[0] * fed[1] > 4 * size[0] * size[1];
+    let is_much_larger = input_size[0] * input_size[1] > 4 * image_size[0] * image_size[1];
     match rule.tile {
         _ if is_much_larger && !rule.takes_any_size() => format!(
             "the image has only {}: check the size that its graph or MODEL.onnx.toml fixes",
-            format_size(size)
+            format_size(image_size)
         ),
         _ if is_much_larger => format!(
             "the image has only {}: check `multiple = {}` in MODEL.onnx.toml or the preset",
-            format_size(size),
+            format_size(image_size),
             rule.multiple
         ),
         _ if !rule.takes_any_size() => {
@@ -106,8 +114,8 @@ fn remedy(rule: SizeRule, fed: [usize; 2], size: [usize; 2]) -> String {
     }
 }
 
-/// Measures the memory cost on small images. Probes that could need more than half of the free memory, if the growth is quadratic, are
-/// skipped.
+/// Measures the memory cost on small images of increasing size. Stops before a probe that could need more than half of the free memory,
+/// assuming quadratic growth.
 fn measure(graph: &Graph, rule: SizeRule, available: u64) -> Result<Estimate> {
     if graph.signature.height.is_some() || graph.signature.width.is_some() {
         return Ok(Estimate::Tensors);
@@ -137,7 +145,7 @@ fn measure(graph: &Graph, rule: SizeRule, available: u64) -> Result<Estimate> {
     Ok(MemoryCost::from_probes(&measured).map_or(Estimate::Tensors, Estimate::Measured))
 }
 
-/// Runs a model on a small image; returns false if it fails.
+/// Runs a model on a square image with sides of `side` pixels; returns false if the run fails.
 fn probe(graph: &Graph, side: usize, arena: Arena) -> Result<bool> {
     let window = TileWindow::whole([side; 2]);
     graph.restart_clock();

@@ -25,13 +25,13 @@ pub struct Motion {
 /// Direction in which an image moves on the sensor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum MotionAngle {
-    /// In degrees: 0 is along a row (the camera turns to the side), 90 is down a column (the camera nods).
+    /// In degrees: 0 is along a row (the camera pans), 90 is down a column (the camera tilts).
     Degrees(f64),
-    /// Random for each frame, uniform over all directions.
+    /// Random for each frame, uniform between 0° and 180°.
     Random,
 }
 
-/// Geometry of a frame that decides its motion blur.
+/// Width and focal length of a frame, which determine its motion blur.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct FrameView {
     /// Width of the image, in pixels.
@@ -41,7 +41,7 @@ pub struct FrameView {
 }
 
 impl Default for Motion {
-    /// A robot that turns slowly to the side, with a wide lens; chosen.
+    /// Slow pan of a robot with a wide-angle lens; chosen.
     fn default() -> Self {
         Self {
             speed: 30.0,
@@ -52,12 +52,12 @@ impl Default for Motion {
 }
 
 impl Motion {
-    /// The path of the centre of a frame during an exposure of this many seconds, of length focal length · angular speed · time.
+    /// Streak of the centre of a frame during an exposure. Its length in pixels is focal length · angular speed · `seconds`.
     ///
-    /// Exact for small rotations at the centre of the image; used as an approximation for the whole image.
+    /// This is the small-angle limit at the centre of the image, and an approximation elsewhere.
     ///
     /// # Errors
-    /// If the path is longer than 256 pixels.
+    /// If the streak is longer than 256 pixels.
     pub fn streak(&self, seconds: f64, view: FrameView, key: &NoiseKey) -> Result<Streak> {
         let focal = view
             .focal
@@ -65,9 +65,9 @@ impl Motion {
         let angle = match self.angle {
             MotionAngle::Degrees(angle) => angle,
             MotionAngle::Random => {
-                let mut words = key.stream(Component::Motion).at(Site::new(0, 0));
-                let half_turn: f64 = Open01.sample(&mut words);
-                180.0 * half_turn
+                let mut random = key.stream(Component::Motion).at(Site::new(0, 0));
+                let fraction: f64 = Open01.sample(&mut random);
+                180.0 * fraction
             }
         };
         Streak::new(focal * self.speed.to_radians() * seconds, angle)
@@ -165,9 +165,9 @@ mod tests {
             .angle()
     }
 
-    /// 30 °/s at 79°: 1.69 pixels in 1/120 s and 6.78 pixels in 1/30 s.
+    /// At 30 °/s and a 79° field of view, a streak in a 640-pixel-wide image is 1.69 pixels long after 1/120 s and 6.78 after 1/30 s.
     #[test]
-    fn the_path_is_focal_length_times_angle() {
+    fn streak_length_is_focal_length_times_angle() {
         let default = "speed=30";
         assert!((length(default, 1.0 / 120.0, VIEW) - 1.694).abs() < 1e-3);
         assert!((length(default, 1.0 / 30.0, VIEW) - 6.776).abs() < 1e-3);
@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn settings_parse_their_own_text() {
+    fn settings_round_trip_through_text() {
         assert_eq!(Motion::default().to_string(), "speed=30,hfov=79,angle=0");
         for text in ["speed=30,hfov=79,angle=0", "speed=0.5,hfov=60,angle=random"] {
             assert_eq!(parse(text).to_string(), text);
