@@ -11,7 +11,7 @@ pub(crate) struct TokenBound {
 }
 
 impl TokenBound {
-    /// One request with this many tokens that the server did not report.
+    /// Returns the bound as the unreported tokens of one request.
     pub(crate) fn unstated(self) -> Unstated {
         Unstated {
             requests: 1,
@@ -20,8 +20,9 @@ impl TokenBound {
         }
     }
 
-    /// Bound on the tokens that the server did not report: zero for reported counts. A server that reports no prompt tokens does not
-    /// count tokens at all, so its zero reply tokens are not a report.
+    /// Returns the bound on the counts that are missing from `usage`; reported counts become 0.
+    ///
+    /// Without prompt tokens (absent or 0), the server does not count tokens: 0 reply tokens are then also missing.
     pub(crate) fn missing_from(self, usage: Usage) -> Self {
         let prompt = usage.prompt_tokens.filter(|tokens| *tokens > 0);
         let reply = match (prompt, usage.completion_tokens) {

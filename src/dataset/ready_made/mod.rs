@@ -5,8 +5,8 @@
 //! 2. Assign roles to the columns, by their names or by `--map` (`columns/`).
 //! 3. Find the images (`pictures/`), text and options (`items.rs`, `choices/`) of each row (`cells/`).
 //! 4. Choose one format for the answers of all rows (`choices/`). If two formats fit and disagree, stop instead of guessing.
-//! 5. Stop at rows that cannot be asked, unless the user leaves them out (`omissions/`).
-//! 6. Give ids and frames to the questions (`pictures/`), and print the inferred mapping (`summary.rs`).
+//! 5. Stop at rows that cannot become questions, unless the user leaves them out (`omissions/`).
+//! 6. Assign ids and frames to the questions (`pictures/`), and print the inferred mapping (`summary.rs`).
 //!
 //! The code is not specific to any set; further rules for well-known sets are presets in `sets.toml`.
 
@@ -65,7 +65,7 @@ pub(super) fn open(places: &[PathBuf], stem: &str, args: &SetArgs) -> Result<Rea
     let FoundFiles {
         files,
         folder,
-        further: allowed,
+        further,
         archive,
         mut notes,
         joined,
@@ -74,9 +74,9 @@ pub(super) fn open(places: &[PathBuf], stem: &str, args: &SetArgs) -> Result<Rea
         Some(archive) => FolderInfo::in_archive(archive)?,
         None => FolderInfo::in_folder(&folder)?,
     };
-    let mut further = args.root.data_root.clone();
-    further.extend(allowed);
-    let root = Root::new(&folder, &further)?;
+    let mut allowed_roots = args.root.data_root.clone();
+    allowed_roots.extend(further);
+    let root = Root::new(&folder, &allowed_roots)?;
     let files: Vec<Arc<SetFile>> = files.into_iter().map(Arc::new).collect();
     let mut table = read_files(&files, joined, args)?;
     table.parse_cells(info.map.iter().chain(&args.map));
@@ -175,7 +175,7 @@ pub(super) struct ReadySet {
     /// Name in `dataset.json`; empty if there is none.
     pub(super) title: String,
     pub(super) sources: BTreeMap<FrameId, ImageSource>,
-    /// Images of each question with several, by the name that stands for all of them.
+    /// Images of each question with several images, by the name of the series.
     pub(super) series: Series,
     pub(super) scenes: SceneNames,
     pub(super) questions: Vec<Question>,
@@ -202,7 +202,7 @@ pub(super) enum SetFormat {
     Foreign,
 }
 
-/// Questions of a file about frames of other data.
+/// Questions from a file whose frames belong to another data set.
 pub(super) struct FileQuestions {
     pub(super) questions: Vec<Question>,
     /// Scenes that the file assigns to the frames.
@@ -213,12 +213,12 @@ pub(super) struct FileQuestions {
     pub(super) rows: RowCounts,
 }
 
-/// Maps the column `frame` to the image, if it exists.
+/// Maps the column `frame` to the image; `None` if the table has no such column.
 fn frame_map(table: &Table) -> Option<ColumnMap> {
     table.find("frame").and_then(|_| "image=frame".parse().ok())
 }
 
-/// Reads a file of questions about frames of other data.
+/// Reads a file of questions whose frames belong to another data set.
 ///
 /// # Errors
 /// As [`open`].
@@ -269,7 +269,7 @@ pub(super) fn questions_about_frames(file: &Path, args: &SetArgs) -> Result<File
     })
 }
 
-/// Questions of a set, the sources of their frames, and how they were read.
+/// Questions of a set, the sources of their frames, and the summary of the set.
 struct SetContents {
     questions: Vec<Question>,
     sources: BTreeMap<FrameId, ImageSource>,
@@ -288,8 +288,9 @@ struct SetContext<'a> {
     args: &'a SetArgs,
 }
 
-/// Gives ids, frames and scenes to the questions, and summarizes the set (step 6). The summary lists `notes` before the note about ids,
-/// and `hint` after it.
+/// Assigns ids, frames and scenes to the questions, and summarizes the set (step 6).
+///
+/// The summary lists `notes` before the notes about scenes and ids, and `hint` after them.
 fn assemble(
     context: &SetContext<'_>,
     mut set: ParsedSet,
@@ -355,8 +356,9 @@ fn assemble(
     })
 }
 
-/// With `--skip bad`, leaves out rows whose image is missing or is not an image. Without it, such an image is an error when it is read.
-/// Images that cannot be decoded are left out later
+/// With `--skip bad`, leaves out rows whose image is missing or is not an image.
+///
+/// Without the flag, reading such an image is an error. Rows whose image cannot be decoded are left out later
 /// ([`Dataset::without_unusable`](crate::dataset::Dataset::without_unusable)).
 fn omit_unusable_images(
     context: &SetContext<'_>,
@@ -383,7 +385,7 @@ fn omit_unusable_images(
         .map_err(|problem| Error::data(context.place.display(), problem))
 }
 
-/// Questions of a set with their true options.
+/// Questions of a set with their correct options.
 struct ParsedSet {
     questions: Vec<ParsedQuestion>,
     /// Columns and formats of the answers, for the summary.
@@ -393,7 +395,7 @@ struct ParsedSet {
     groups: Groups,
 }
 
-/// Parses the rows to questions with their true options (steps 2 to 5).
+/// Parses the rows into questions with their correct options (steps 2 to 5).
 fn parse_rows(
     table: &Table,
     map: &ColumnMap,
@@ -469,7 +471,7 @@ fn with_image_hint(table: &Table, roles: &Roles, problem: String) -> String {
     )
 }
 
-/// Adds the flag that leaves the row out to the error for a missing image.
+/// Adds a hint about `--skip bad` to an error about the image of a row.
 fn with_skip_hint(error: Error) -> Error {
     const FLAG: &str = "--skip bad";
     match error {
@@ -481,7 +483,7 @@ fn with_skip_hint(error: Error) -> Error {
     }
 }
 
-/// Builds the questions. Collects the sources of their frames in `frames` and their scenes in `scenes`.
+/// Builds the questions. Collects the sources of the frames in `frames` and the scenes in `scenes`.
 fn build_questions(
     context: &SetContext<'_>,
     families: &FamilySource,

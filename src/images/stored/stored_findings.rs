@@ -1,4 +1,4 @@
-//! Findings about enhancers in the image store: that a model was opened, and the result of its probe ([`StoredFindings`]).
+//! Cached findings about enhancers in the image store: opened models and results of their probes ([`StoredFindings`]).
 
 use std::time::Duration;
 
@@ -12,21 +12,21 @@ use crate::images::recipes::{ImageKeyFacts, Maker, Recipe};
 use crate::types::{Condition, Digest};
 use darkqa_enhance::{self, Findings};
 
-/// The image store, with the settings that decide how enhancers run.
+/// Findings in the image store that were made with one set of enhancer settings.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct StoredFindings<'a> {
     store: &'a ImageStore,
     maker: &'a Maker,
 }
 
-/// The facts that decide the findings about a model.
+/// Inputs of a store key: everything that can change the findings about a model.
 #[derive(Serialize)]
 struct FindingsRecipe<'a> {
     /// Digest of the model, its sidecar and its preset.
     stated: Digest,
     version: u32,
     maker: &'a Maker,
-    /// Facts that decide the dark images of the probe, one list per frame; `None` for the entry that the model was opened.
+    /// Inputs of the probe's dark images, one list per source. `None` in the key that records an opened model.
     frames: Option<Vec<Vec<ImageKeyFacts<'a>>>>,
 }
 
@@ -44,7 +44,7 @@ impl<'a> StoredFindings<'a> {
         })
     }
 
-    /// True if all models of a command were opened and probed before, so they need not be opened to check them.
+    /// True if all models of a command were opened and probed before. Such models need not be opened again to be checked.
     ///
     /// # Errors
     /// If a sidecar has a number that is infinite or NaN.
@@ -57,10 +57,10 @@ impl<'a> StoredFindings<'a> {
         Ok(true)
     }
 
-    /// The place of the findings of a model's probe on these frames and conditions.
+    /// Location in the store of the findings of a model's probe on these frames and conditions.
     ///
     /// # Errors
-    /// If a frame cannot be shown in one of its conditions.
+    /// If a frame cannot be shown in one of its conditions, or a sidecar has a number that is infinite or NaN.
     pub(crate) fn place(
         self,
         recipe: &Recipe,
@@ -69,12 +69,12 @@ impl<'a> StoredFindings<'a> {
     ) -> Result<FindingsPlace<'a>> {
         let facts = frames
             .iter()
-            .map(|(source, conditions)| frame_facts(recipe, source, conditions))
+            .map(|(source, conditions)| middle_frame_facts(recipe, source, conditions))
             .collect::<Result<Vec<_>>>()?;
         Ok(FindingsPlace {
             store: self.store,
-            opened: self.key(model, None)?,
-            probed: self.key(model, Some(facts))?,
+            opened_key: self.key(model, None)?,
+            probe_key: self.key(model, Some(facts))?,
             shown: Shown {
                 content: Content::Probe,
                 enhancer: Some(model.name().to_string()),
@@ -84,8 +84,8 @@ impl<'a> StoredFindings<'a> {
     }
 }
 
-/// The facts that decide the images of the middle frame of a source in these conditions, before enhancement.
-fn frame_facts<'a>(
+/// Key facts of a source's middle frame in each condition, before enhancement; empty if the source has no middle frame.
+fn middle_frame_facts<'a>(
     recipe: &'a Recipe,
     source: &'a Source,
     conditions: &[Condition],
@@ -96,42 +96,43 @@ fn frame_facts<'a>(
     conditions
         .iter()
         .map(|condition| {
-            let raw = Condition {
+            let unenhanced = Condition {
                 enhancer: None,
                 ..condition.clone()
             };
-            recipe.key_facts(&source.name, frame, &raw)
+            recipe.key_facts(&source.name, frame, &unenhanced)
         })
         .collect()
 }
 
-/// The place of the findings of a probe in the image store.
+/// Location of the findings of a probe in the image store.
 #[derive(Debug, Clone)]
 pub(crate) struct FindingsPlace<'a> {
     store: &'a ImageStore,
-    /// Key of the entry that the model was opened.
-    opened: Key,
-    probed: Key,
+    /// Key of the entry that marks the model as opened.
+    opened_key: Key,
+    /// Key of the entry with the findings.
+    probe_key: Key,
     shown: Shown,
 }
 
 impl FindingsPlace<'_> {
-    /// The findings; `None` if the store has none.
+    /// Reads the findings; `None` if the store does not have them.
     pub(crate) fn read(&self) -> Option<Findings> {
         let mut findings: Option<Findings> = None;
-        self.store.get(&self.probed, Content::Probe, |entry| {
+        self.store.get(&self.probe_key, Content::Probe, |entry| {
             findings = serde_json::from_value(entry.facts.notes.clone()).ok();
             findings.is_some()
         })?;
         findings
     }
 
-    /// Writes the findings. `took` is the duration of opening and probing.
+    /// Writes the findings, then marks the model as opened. `took` is the duration of opening and probing.
     pub(crate) fn write(&self, findings: &Findings, took: Duration) {
         let milliseconds = took.as_millis() as u64;
         for (key, milliseconds, notes) in [
-            (&self.probed, milliseconds, serde_json::json!(findings)),
-            (&self.opened, 0, serde_json::Value::Null),
+            (&self.probe_key, milliseconds, serde_json::json!(findings)),
+            (&self.opened_key, 0, serde_json::Value::Null),
         ] {
             let facts = EntryFacts::new(self.shown.clone(), milliseconds, notes);
             self.store.put(key, &Entry::from_facts(facts));

@@ -6,15 +6,16 @@ use super::colors::{Color, Palette};
 use super::rules::RuleBook;
 use super::statistics::{FrameStatistics, Segment, WordSource};
 
-/// Colours of each object, by scene, number and word, over all frames that show it well enough.
+/// Colours of each object in all frames that show at least `color.view_px` core pixels, by scene, segment id and word. A colour is
+/// `None` if the palette has no name for it.
 ///
-/// Only segments with names can be matched across frames, because the names of a scene belong to its numbers. A connected component has
-/// another number in each frame.
+/// Only segments with names are matched across frames: their ids are the same in all frames of a scene. A connected component has a
+/// different id in each frame.
 #[derive(Debug, Default)]
 pub struct Views(BTreeMap<(String, u32, String), BTreeSet<Option<Color>>>);
 
 impl Views {
-    /// Collects the colours in these frames; the colour of a view is that of its median.
+    /// Collects the colour of the median of each named segment in these frames.
     pub fn new(frames: &[FrameStatistics], palette: &Palette, book: &RuleBook) -> Self {
         let mut views = Self::default();
         for frame in frames {
@@ -35,7 +36,8 @@ impl Views {
         (frame.scene.clone(), segment.id, segment.word.clone())
     }
 
-    /// True if the object has another colour than this one in some view.
+    /// True if any view of a named object has a colour other than `color`; `None` counts as another colour. False for segments without
+    /// names.
     pub fn has_other_color(
         &self,
         frame: &FrameStatistics,

@@ -28,10 +28,10 @@ pub(crate) struct NewPlan {
 }
 
 impl NewPlan {
-    /// Writes the plan into the folder of a run, by renaming a temporary folder. If the run has an earlier plan with the same questions and
-    /// frames, the plan keeps its costs, so that shards keep their frames.
+    /// Writes the plan into the folder of a run, by renaming a temporary folder. Returns the folder of the plan.
     ///
-    /// Returns the folder of the plan.
+    /// If an earlier plan of the run has the same questions and frames, the new plan reuses the earlier costs. With new costs, frames could
+    /// move to other shards.
     ///
     /// # Errors
     /// If the run has shards of an earlier plan with other questions or frames, or a file cannot be written.
@@ -39,7 +39,7 @@ impl NewPlan {
         let folder = run.join(PLAN);
         let earlier = RunPlan::read(run)?;
         if let Some(earlier) = &earlier {
-            if self.has_content_of(earlier) {
+            if self.has_same_content(earlier) {
                 self.frames.clone_from(&earlier.frames);
             } else if let Some(shard) = first_shard(run)? {
                 let problem = format!(
@@ -54,11 +54,11 @@ impl NewPlan {
         }
         let questions = json_lines(&self.questions)?;
         let frames = json_lines(&self.frames)?;
-        let file = serde_json::to_vec_pretty(&self.file(&questions, &frames, forecast))
+        let file = serde_json::to_vec_pretty(&self.to_plan_file(&questions, &frames, forecast))
             .map_err(|e| Error::data(PLAN_FILE, e))?;
         let unfinished = run.join(format!(".{PLAN}{UNFINISHED}"));
         if unfinished.exists() {
-            remove(&unfinished)?;
+            remove_folder(&unfinished)?;
         }
         fs::create_dir_all(&unfinished).map_err(|e| Error::file(&unfinished, "create", e))?;
         for (name, content) in [
@@ -75,14 +75,14 @@ impl NewPlan {
                 .map_err(|e| Error::file(&path, "write", e))?;
         }
         if folder.exists() {
-            remove(&folder)?;
+            remove_folder(&folder)?;
         }
         fs::rename(&unfinished, &folder).map_err(|e| Error::file(&folder, "write", e))?;
         Ok(folder)
     }
 
     /// True if an earlier plan has the same questions and frames.
-    fn has_content_of(&self, earlier: &RunPlan) -> bool {
+    fn has_same_content(&self, earlier: &RunPlan) -> bool {
         self.questions == earlier.questions
             && self.frames.len() == earlier.frames.len()
             && self
@@ -92,11 +92,11 @@ impl NewPlan {
                 .all(|(now, before)| now.is_same(before))
     }
 
-    fn file(&self, questions: &[u8], frames: &[u8], forecast: &Forecast) -> PlanFile {
-        let files = [(QUESTIONS, questions), (FRAMES, frames)];
-        let files = files.map(|(name, content)| (name.to_owned(), Digest::from_bytes(content)));
+    fn to_plan_file(&self, questions: &[u8], frames: &[u8], forecast: &Forecast) -> PlanFile {
+        let files = [(QUESTIONS, questions), (FRAMES, frames)]
+            .map(|(name, content)| (name.to_owned(), Digest::from_bytes(content)));
         let scenes: BTreeSet<&str> = self.frames.iter().map(|frame| &*frame.scene).collect();
-        let seconds = self.frames.iter().map(|frame| frame.cost.seconds);
+        let seconds = self.frames.iter().map(|frame| frame.cost.seconds).sum();
         PlanFile {
             schema: SCHEMA.to_owned(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -108,14 +108,14 @@ impl NewPlan {
                 scenes: scenes.into_iter().filter(|scene| !scene.is_empty()).count(),
                 trials: self.trials,
             },
-            estimate: PlanEstimate::new(forecast, seconds.sum()),
+            estimate: PlanEstimate::new(forecast, seconds),
             models: self.models.clone(),
             command: self.command.clone(),
         }
     }
 }
 
-/// The first shard in the folder of a run; `None` if there is none.
+/// Folder of the first shard of a run, if any.
 fn first_shard(run: &Path) -> Result<Option<PathBuf>> {
     for path in reading::entries(run)? {
         if path.is_dir() && store::schema(&path)?.is_some() {
@@ -125,7 +125,7 @@ fn first_shard(run: &Path) -> Result<Option<PathBuf>> {
     Ok(None)
 }
 
-fn remove(folder: &Path) -> Result<()> {
+fn remove_folder(folder: &Path) -> Result<()> {
     fs::remove_dir_all(folder).map_err(|e| Error::file(folder, "remove", e))
 }
 

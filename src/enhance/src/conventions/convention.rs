@@ -1,7 +1,7 @@
 //! Properties of a model's input and output that its graph may not declare: [`TensorLayout`], [`Channels`], [`ChannelOrder`],
 //! [`ValueRange`], [`ValueScale`], [`Padding`], [`Locality`], [`Rounding`].
 //!
-//! Their text forms are the values of keys in the sidecar, `MODEL.onnx.toml`.
+//! The text form of each property is a value in the sidecar, `MODEL.onnx.toml`.
 
 use std::fmt;
 use std::str::FromStr;
@@ -69,7 +69,7 @@ pub(crate) enum Channels {
     /// Red, green and blue.
     #[default]
     Rgb,
-    /// Only the luma ([`LUMA`]), 0..1. The enhanced image keeps the chroma: the change of luma is added to each channel.
+    /// Luma alone ([`LUMA`]), in 0..1. The change in luma is added to each channel of the image, which preserves the chroma.
     Y,
 }
 
@@ -110,7 +110,7 @@ pub(crate) enum ChannelOrder {
 }
 
 impl ChannelOrder {
-    /// Index of the RGB channel at index `channel` of the model's order, and vice versa.
+    /// Index in RGB order of channel `channel` of the model. The mapping is its own inverse.
     pub(crate) fn rgb_channel(self, channel: usize) -> usize {
         match self {
             Self::Rgb => channel,
@@ -138,7 +138,7 @@ pub(crate) enum ValueRange {
 impl ValueRange {
     pub(crate) const ALL: [Self; 3] = [Self::Unit, Self::Bytes, Self::Signed];
 
-    /// Maps a code of 0..255 to this range, with the operations that the models' own scripts use.
+    /// Maps a code of 0..255 to this range, by the same operations as the models' reference scripts.
     pub(crate) fn scale_code(self, code: f32) -> f32 {
         match self {
             Self::Unit => code / 255.0,
@@ -237,7 +237,7 @@ impl fmt::Display for ValueScale {
     }
 }
 
-/// Content of the pixels added at the right and bottom to reach the model's multiple.
+/// Padding at the right and bottom, to make each side a multiple of the number that the model requires.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Padding {
@@ -248,12 +248,12 @@ pub(crate) enum Padding {
     Zero,
     /// The last pixel, repeated.
     Replicate,
-    /// No padding: the model runs on overlapping parts whose sides are multiples, the last of which end at the image's edges.
+    /// No padding: the model runs on overlapping crops of valid size. The last crops end at the edges of the image.
     Crop,
 }
 
 impl Padding {
-    /// Index of the pixel copied to `position`, which may be beyond the end of a side of `side` pixels; `None` for black.
+    /// Index of the source pixel for `position` along a side of `side` pixels; `None` for black. Positions from `side` on are padding.
     pub(crate) fn source(self, position: usize, side: usize) -> Option<usize> {
         if position < side {
             return Some(position);
@@ -262,7 +262,7 @@ impl Padding {
             Self::Zero => None,
             Self::Replicate | Self::Crop => Some(side - 1),
             Self::Reflect => {
-                // The pattern repeats, because padding larger than the image is mirrored again at the first pixel.
+                // Padding larger than the image is mirrored again at the first pixel, so the pattern is periodic.
                 let period = (2 * (side - 1)).max(1);
                 let within = position % period;
                 Some(within.min(period - within).min(side - 1))
@@ -294,12 +294,12 @@ impl fmt::Display for Rounding {
     }
 }
 
-/// Neighbourhood in the input on which a pixel of the output depends (key `tile`).
+/// Receptive field: the neighbourhood in the input on which a pixel of the output depends (key `tile`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Locality {
     /// The whole image, so that the image cannot be tiled.
     Global,
-    /// This number of pixels on each side, so that tiles with that context are exact.
+    /// This number of pixels on each side. Tiles with that context give exact results.
     Exact(usize),
 }
 
@@ -350,7 +350,7 @@ pub(crate) enum ElementType {
 }
 
 impl ElementType {
-    /// Value range that the type implies: 0..255 for bytes.
+    /// Value range implied by the type: 0..255 for `Uint8`, else `None`.
     pub(crate) fn implied_range(&self) -> Option<ValueRange> {
         (*self == Self::Uint8).then_some(ValueRange::Bytes)
     }

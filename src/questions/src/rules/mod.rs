@@ -18,7 +18,7 @@ pub use entries::*;
 
 /// Text of the built-in rulebook.
 const BUILT_IN: &str = include_str!("../rules.toml");
-/// Schema of the file, with its version.
+/// Name and version of the schema of a rulebook file.
 const SCHEMA: &str = "darkqa.rules/1";
 
 /// A validated rulebook with its digests.
@@ -36,7 +36,7 @@ pub struct RuleBook {
     schema: String,
     /// Version of the rules, recorded in the evidence of each question.
     pub version: String,
-    /// Seed of every pick among equally good candidates.
+    /// Seed of the random choices among equally good candidates.
     pub seed: u64,
     pub measure: MeasureRule,
     pub qualified: EvidenceRule,
@@ -47,7 +47,7 @@ pub struct RuleBook {
     pub names: WordRules,
     pub confusable: Vec<Confusable>,
     pub room: RoomRule,
-    /// Tokens in order of priority: the first one that matches a segment counts.
+    /// Rules for the token of a segment, in order of priority; the first match applies.
     pub token: Vec<TokenRule>,
     pub clue: Vec<Clue>,
     pub contest: Vec<Contest>,
@@ -55,7 +55,7 @@ pub struct RuleBook {
     pub closed_world: ClosedWorld,
     /// "What type of room is this?"
     pub room_type: RoomTypeRule,
-    /// "Is this room suitable for this?"
+    /// "Is this room suitable for cooking?"
     pub affordance: AffordanceRule,
     pub activity: Vec<ActivityRule>,
     /// "Is there a chair in the image?"
@@ -123,14 +123,15 @@ fn digest_values(values: &impl Serialize) -> serde_json::Result<Digest> {
 }
 
 impl RuleBook {
-    /// True if a class has a property; false for unknown classes.
+    /// True if a class has a flag; false for unknown classes.
     #[must_use]
     pub fn has_flag(&self, class: &str, flag: ClassFlag) -> bool {
-        let class = self.class.get(class);
-        class.is_some_and(|class| class.flags.contains(&flag))
+        self.class
+            .get(class)
+            .is_some_and(|class| class.flags.contains(&flag))
     }
 
-    /// Word in questions for an object that a data set names `word`; `None` if questions do not use this word for objects of the class.
+    /// Spelling in questions of a data set's `word` for an object; `None` if the class does not have this word.
     #[must_use]
     pub fn question_word(&self, class: &str, word: &str) -> Option<&str> {
         let plain = word.replace('_', " ");
@@ -142,7 +143,7 @@ impl RuleBook {
             .map(String::as_str)
     }
 
-    /// Fills the word of an object into a template; `plural` is used for plural words.
+    /// Fills an object's word into a template: `plural` for plural words, else `singular` with the article.
     #[must_use]
     pub fn fill_template(&self, singular: &str, plural: &str, word: &str) -> String {
         if self.words.plural.contains(word) {
@@ -158,7 +159,7 @@ impl RuleBook {
             .replace("{object}", word)
     }
 
-    /// True if a word of a data set may name an object of a class, because it ends in a word of the class: "decorative lamp" in "lamp".
+    /// True if a data set's word ends in a word of the class and may name such an object: "decorative lamp" ends in "lamp".
     #[must_use]
     pub fn resembles(&self, word: &str, class: &str) -> bool {
         let plain = word.replace('_', " ");
@@ -174,7 +175,7 @@ impl RuleBook {
             })
     }
 
-    /// Token of a segment, given its word and class; the class itself if no token matches.
+    /// Token of a segment with the word `name` and this class; the class itself if no rule matches.
     #[must_use]
     pub fn token<'a>(&'a self, name: &str, class: &'a str) -> &'a str {
         let token = self.token.iter().find(|token| {
@@ -216,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn every_word_has_its_article() {
+    fn words_have_article_or_plural() {
         let rules = Rules::built_in().unwrap();
         let book = rules.book();
         for word in book
@@ -233,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn comments_change_no_digest() {
+    fn digests_ignore_comments_and_track_values() {
         let commented = format!("# nothing\n{BUILT_IN}");
         let (rules, same) = (
             Rules::built_in().unwrap(),
@@ -249,7 +250,7 @@ mod tests {
 
     #[test]
     fn invalid_rules_are_reported() {
-        for (from, to, says) in [
+        for (from, to, expected) in [
             ("gap_mm = 300", "gap_mm = \"wide\"", "line "),
             ("gap_mm = 300", "gap_mn = 300", "unknown field `gap_mn`"),
             (
@@ -305,7 +306,7 @@ mod tests {
                 .unwrap_err()
                 .to_string();
             assert!(
-                error.starts_with("rules: ") && error.contains(says),
+                error.starts_with("rules: ") && error.contains(expected),
                 "{error}"
             );
         }

@@ -1,9 +1,9 @@
-//! "Which object is closest to the camera?"
+//! Tests of "Which object is closest to the camera?"
 
 use super::*;
 
-/// Why the question is rejected for a chair at 2 m and a table at 3 m, after a change.
-fn two(change: impl FnOnce(&mut FrameStatistics)) -> Option<Reason> {
+/// Reason to reject the question about a chair at 2 m and a table at 3 m, after `change`; `None` if it is accepted.
+fn rejection_after_change(change: impl FnOnce(&mut FrameStatistics)) -> Option<Reason> {
     let mut frame = frame(&[
         ("chair", "chair", 50_000),
         ("table", "table", 50_000),
@@ -15,10 +15,15 @@ fn two(change: impl FnOnce(&mut FrameStatistics)) -> Option<Reason> {
     candidate(&frame, &Family::Closest, "", "").err()
 }
 
-fn third(frame: &mut FrameStatistics, class: &str, area: u64, depth: Option<u32>) {
+/// Adds a segment of `area` pixels at `depth` millimetres, without depth values if `None`.
+fn add_third_segment(frame: &mut FrameStatistics, class: &str, area: u64, depth: Option<u32>) {
     let mut segment = frame.segments[0].clone();
-    (segment.id, segment.class, segment.word) = (9, class.to_owned(), class.to_owned());
-    (segment.area, segment.pure, segment.core) = (area, area, area);
+    segment.id = 9;
+    segment.class = class.to_owned();
+    segment.word = class.to_owned();
+    segment.area = area;
+    segment.pure = area;
+    segment.core = area;
     segment.depth = depth.map(|depth| depth_at(area, depth));
     frame.segments.push(segment);
 }
@@ -39,14 +44,14 @@ fn the_nearest_object_is_the_answer() {
     frame.segments[4].depth = Some(depth_at(50_000, 1000));
     let question = candidate(&frame, &Family::Closest, "", "").unwrap();
     assert_eq!(question.answer(), "sink");
-    assert_eq!(two(|_| {}), None);
+    assert_eq!(rejection_after_change(|_| {}), None);
 }
 
 #[test]
 fn the_gap_must_be_wide() {
     for (nearest, depths) in [(2000, [2300, 2299]), (5000, [5500, 5499])] {
         let reasons = depths.map(|depth| {
-            two(|frame| {
+            rejection_after_change(|frame| {
                 frame.segments[0].depth = Some(depth_at(50_000, nearest));
                 frame.segments[1].depth = Some(depth_at(50_000, depth));
             })
@@ -54,7 +59,7 @@ fn the_gap_must_be_wide() {
         assert_eq!(reasons, [None, Some(Reason::Gap)], "{nearest}");
     }
     let reasons = [2050, 2049, 1899].map(|p10| {
-        two(|frame| {
+        rejection_after_change(|frame| {
             frame.segments[1].depth = Some(SegmentDepth {
                 valid: 50_000,
                 p10,
@@ -67,20 +72,20 @@ fn the_gap_must_be_wide() {
 }
 
 #[test]
-fn the_scope_decides_about_two_objects_of_one_class() {
+fn gap_scope_counts_instances_or_classes() {
     assert_eq!(
-        two(|frame| third(frame, "chair", 50_000, Some(2100))),
+        rejection_after_change(|frame| add_third_segment(frame, "chair", 50_000, Some(2100))),
         Some(Reason::Gap)
     );
-    let classes = rules("gap_scope = \"instances\"", "gap_scope = \"classes\"");
+    let class_rules = rules("gap_scope = \"instances\"", "gap_scope = \"classes\"");
     let mut frame = frame(&[("chair", "chair", 50_000), ("table", "table", 50_000)]);
-    third(&mut frame, "chair", 50_000, Some(3100));
+    add_third_segment(&mut frame, "chair", 50_000, Some(3100));
     assert_eq!(
         candidate(&frame, &Family::Closest, "", "").err(),
         Some(Reason::Gap)
     );
     assert_eq!(
-        candidate_by(&frame, &Family::Closest, "", "", &classes)
+        candidate_by(&frame, &Family::Closest, "", "", &class_rules)
             .unwrap()
             .answer(),
         "chair"
@@ -90,7 +95,7 @@ fn the_scope_decides_about_two_objects_of_one_class() {
 #[test]
 fn two_objects_must_be_eligible() {
     assert_eq!(
-        two(|frame| drop(frame.segments.remove(1))),
+        rejection_after_change(|frame| drop(frame.segments.remove(1))),
         Some(Reason::Few)
     );
     for (class, word) in [
@@ -102,77 +107,109 @@ fn two_objects_must_be_eligible() {
         ("sofa", "blanket"),
         ("clothes", ""),
     ] {
-        let reason = two(|frame| {
+        let reason = rejection_after_change(|frame| {
             frame.segments[1].class = class.to_owned();
             frame.segments[1].word = word.to_owned();
         });
         assert_eq!(reason, Some(Reason::Few), "{class}");
     }
     assert_eq!(
-        two(|frame| frame.segments[1].class = "chair".into()),
+        rejection_after_change(|frame| frame.segments[1].class = "chair".into()),
         Some(Reason::Few)
     );
     let small = [5_000, 4_999].map(|area| {
-        two(|frame| {
+        rejection_after_change(|frame| {
             let segment = &mut frame.segments[1];
-            (segment.area, segment.pure, segment.core) = (area, area, area);
+            segment.area = area;
+            segment.pure = area;
+            segment.core = area;
             segment.depth = Some(depth_at(area, 3000));
         })
     });
     assert_eq!(small, [None, Some(Reason::Few)]);
-    let unmeasured = [25_000, 24_999]
-        .map(|valid| two(|frame| frame.segments[1].depth = Some(depth_at(valid, 3000))));
+    let unmeasured = [25_000, 24_999].map(|valid| {
+        rejection_after_change(|frame| frame.segments[1].depth = Some(depth_at(valid, 3000)))
+    });
     assert_eq!(unmeasured, [None, Some(Reason::Few)]);
 }
 
 #[test]
 fn depth_must_exist_and_be_plausible() {
-    assert_eq!(two(|frame| frame.depth = None), Some(Reason::NoDepth));
+    assert_eq!(
+        rejection_after_change(|frame| frame.depth = None),
+        Some(Reason::NoDepth)
+    );
     for medians in [[300, 299], [15_000, 15_001]] {
-        let reasons =
-            medians.map(|median| two(|frame| frame.depth.as_mut().unwrap().median = median));
+        let reasons = medians.map(|median| {
+            rejection_after_change(|frame| frame.depth.as_mut().unwrap().median = median)
+        });
         assert_eq!(reasons, [None, Some(Reason::Scale)], "{medians:?}");
     }
-    let void = [50_000, 50_001].map(|void| two(|frame| frame.lower_void = void));
+    let void = [50_000, 50_001].map(|void| rejection_after_change(|frame| frame.lower_void = void));
     assert_eq!(void, [None, Some(Reason::Void)]);
 }
 
-/// Why the question is rejected if a third segment is in the frame.
-fn rival(class: &str, area: u64, depth: Option<u32>) -> Option<Reason> {
-    two(|frame| third(frame, class, area, depth))
+/// Reason to reject the question with a third segment in the frame; `None` if it is accepted.
+fn rejection_with_third_segment(class: &str, area: u64, depth: Option<u32>) -> Option<Reason> {
+    rejection_after_change(|frame| add_third_segment(frame, class, area, depth))
 }
 
 #[test]
 fn objects_that_may_be_nearer_block_the_question() {
     for class in ["objects", "misc", "furniture", "clothes", "gym_equipment"] {
         assert_eq!(
-            rival(class, 2_000, Some(2_999)),
+            rejection_with_third_segment(class, 2_000, Some(2_999)),
             Some(Reason::Rival),
             "{class}"
         );
-        assert_eq!(rival(class, 2_000, Some(3_000)), None, "{class}");
-        assert_eq!(rival(class, 1_999, Some(2_999)), None, "{class}");
         assert_eq!(
-            rival(class, 10_000, None),
+            rejection_with_third_segment(class, 2_000, Some(3_000)),
+            None,
+            "{class}"
+        );
+        assert_eq!(
+            rejection_with_third_segment(class, 1_999, Some(2_999)),
+            None,
+            "{class}"
+        );
+        assert_eq!(
+            rejection_with_third_segment(class, 10_000, None),
             Some(Reason::Unmeasured),
             "{class}"
         );
-        assert_eq!(rival(class, 9_999, None), None, "{class}");
+        assert_eq!(
+            rejection_with_third_segment(class, 9_999, None),
+            None,
+            "{class}"
+        );
     }
     for class in ["wall", "floor", "door", "picture", "curtain", "board_panel"] {
-        assert_eq!(rival(class, 90_000, Some(1_000)), None, "{class}");
-        assert_eq!(rival(class, 90_000, None), None, "{class}");
+        assert_eq!(
+            rejection_with_third_segment(class, 90_000, Some(1_000)),
+            None,
+            "{class}"
+        );
+        assert_eq!(
+            rejection_with_third_segment(class, 90_000, None),
+            None,
+            "{class}"
+        );
     }
-    // Rivals: too small for an answer but near; a mixed segment of any class; far by the median but near by the 10 % quantile.
-    assert_eq!(rival("sofa", 4_000, Some(1_000)), Some(Reason::Rival));
-    let mixed = two(|frame| {
-        third(frame, "wall", 90_000, Some(1_000));
+    // A near object that is too small for an answer is a rival.
+    assert_eq!(
+        rejection_with_third_segment("sofa", 4_000, Some(1_000)),
+        Some(Reason::Rival)
+    );
+    // A near segment that is not pure is a rival, whatever its class.
+    let mixed = rejection_after_change(|frame| {
+        add_third_segment(frame, "wall", 90_000, Some(1_000));
         frame.segments.last_mut().unwrap().pure = 70_000;
     });
     assert_eq!(mixed, Some(Reason::Rival));
-    let reaching = [1_900, 1_899].map(|p10| {
-        two(|frame| {
-            third(frame, "objects", 90_000, Some(4_000));
+    // A segment that is far by the median is a rival if its 10 % quantile is near.
+    let far_by_median = [1_900, 1_899].map(|p10| {
+        rejection_after_change(|frame| {
+            add_third_segment(frame, "objects", 90_000, Some(4_000));
             frame.segments.last_mut().unwrap().depth = Some(SegmentDepth {
                 valid: 90_000,
                 p10,
@@ -181,13 +218,13 @@ fn objects_that_may_be_nearer_block_the_question() {
             });
         })
     });
-    assert_eq!(reaching, [None, Some(Reason::Rival)]);
+    assert_eq!(far_by_median, [None, Some(Reason::Rival)]);
     for (class, pixels, expected) in [
         ("objects", 1_999, None),
         ("objects", 2_000, Some(Reason::Rival)),
         ("wall", 500_000, None),
     ] {
-        let reason = two(|frame| {
+        let reason = rejection_after_change(|frame| {
             frame.loose.insert(class.into(), pixels);
         });
         assert_eq!(reason, expected, "{class} {pixels}");

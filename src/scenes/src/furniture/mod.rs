@@ -26,7 +26,7 @@ pub(super) struct FurnitureSet {
 }
 
 impl FurnitureSet {
-    /// Creates a set of one piece, with the size of that piece.
+    /// Creates a set of one piece. Its size is a box from y = 0 and z = 0, symmetric about x = 0, that contains the piece.
     pub(super) fn from_piece(piece: Piece) -> Self {
         let [low, high] = bounds(&piece.mesh.faces);
         let width = 2.0 * high.x.max(-low.x);
@@ -37,14 +37,14 @@ impl FurnitureSet {
         }
     }
 
-    /// Returns the set with one more piece.
+    /// Returns the set with one more piece; `size` stays the same.
     pub(super) fn with(mut self, piece: Piece, pose: Pose) -> Self {
         self.pieces.push((piece, pose));
         self
     }
 }
 
-/// Adds four square legs below a plate of this width and depth; the height of `size` is that of the legs.
+/// Adds four square legs under a plate. `size` is the width of the plate, the height of the legs, and the depth of the plate.
 fn add_legs(mesh: &mut Mesh, size: Vec3, inset: f32, thick: f32, surface: &Surface) {
     for (x, z) in [(-1.0, 0.0), (1.0, 0.0), (-1.0, 1.0), (1.0, 1.0)] {
         let foot = vec3(

@@ -1,4 +1,4 @@
-//! Pieces that hang on or lean against walls, with their back at z = 0.
+//! Pictures, mirrors, screens, windows, blinds and doors. Lengths are in metres; the wall is at z = 0.
 
 use glam::{Vec3, vec2, vec3};
 
@@ -10,7 +10,7 @@ use super::super::seeded_rng::SeededRng;
 use super::super::surface::{Surface, SurfaceFinish};
 use super::parts;
 
-/// Adds four bars around a rectangle with its lower edge at y = 0.
+/// Adds a frame of four bars around a rectangle with its lower edge at y = 0. `bar` is the width of a bar, `thick` its depth.
 fn add_frame(mesh: &mut Mesh, width: f32, height: f32, bar: f32, thick: f32, surface: &Surface) {
     let (left, right) = (-width / 2.0, width / 2.0);
     for [low, high] in [
@@ -52,7 +52,7 @@ pub(in super::super) fn picture(rng: &mut SeededRng) -> Piece {
     Piece::new(kind("picture", "picture"), mesh, "")
 }
 
-/// A mirror of a size in its frame.
+/// A framed mirror. `width` and `height` exclude the frame.
 pub(in super::super) fn mirror(width: f32, height: f32, rng: &mut SeededRng) -> Piece {
     let rim = Surface::gloss(Paint::random(&["black", "brown", "grey"], rng));
     let glass = Surface::plain([255, 255, 255]).with_finish(SurfaceFinish::Mirror);
@@ -62,17 +62,17 @@ pub(in super::super) fn mirror(width: f32, height: f32, rng: &mut SeededRng) -> 
     Piece::new(kind("mirror", "mirror"), mesh, "")
 }
 
-/// A flat television, for the wall or with a foot.
+/// A flat television, with or without a foot.
 pub(in super::super) fn television(width: f32, foot: bool) -> Piece {
-    panel(kind("tv", "tv_monitor"), width, foot)
+    flat_screen_piece(kind("tv", "tv_monitor"), width, foot)
 }
 
-/// A computer monitor on its foot.
+/// A computer monitor with a foot.
 pub(in super::super) fn monitor(width: f32) -> Piece {
-    panel(kind("monitor", "tv_monitor"), width, true)
+    flat_screen_piece(kind("monitor", "tv_monitor"), width, true)
 }
 
-fn panel(name: ThingKind, width: f32, foot: bool) -> Piece {
+fn flat_screen_piece(name: ThingKind, width: f32, foot: bool) -> Piece {
     let height = width * 0.58;
     let case = Surface::gloss(Paint::nameless([24, 24, 26]));
     let screen = Surface::plain([34, 40, 52])
@@ -95,7 +95,7 @@ fn panel(name: ThingKind, width: f32, foot: bool) -> Piece {
     Piece::new(name, mesh, "black")
 }
 
-/// A window of a size with its sill at y = 0. `daylight` is the radiance of the light that comes in.
+/// A window with the lower edge of the pane at y = 0. `daylight` is the radiance of the incoming light.
 pub(in super::super) fn window(width: f32, height: f32, daylight: f32) -> Piece {
     let half = width / 2.0;
     let white = Surface::plain([240, 240, 238]);
@@ -125,7 +125,8 @@ pub(in super::super) fn window(width: f32, height: f32, daylight: f32) -> Piece 
     piece
 }
 
-/// Blinds in front of a window of a size with its sill at y = 0; `share` is the covered part of the height.
+/// Blinds in front of a window of this width and height, with the lower edge of the pane at y = 0. `share` is the covered part of the
+/// height, in 0..1.
 pub(in super::super) fn blinds(width: f32, height: f32, share: f32, rng: &mut SeededRng) -> Piece {
     let half = width / 2.0;
     let paint = Paint::random(
@@ -153,18 +154,18 @@ pub(in super::super) fn blinds(width: f32, height: f32, share: f32, rng: &mut Se
     Piece::new(kind("blinds", "blinds"), mesh, paint.name)
 }
 
-/// A door of a width and height in its frame, opened by an angle into the room behind it.
+/// A door with a frame. The leaf is opened by `angle` into the room behind the wall.
 pub(in super::super) fn door([width, height]: [f32; 2], angle: f32, rng: &mut SeededRng) -> Piece {
-    let rail = Surface::plain(rng.pick(&[[196, 192, 182], [92, 64, 44], [150, 146, 138]]));
+    let frame_surface = Surface::plain(rng.pick(&[[196, 192, 182], [92, 64, 44], [150, 146, 138]]));
     let half = width / 2.0;
     let mut mesh = Mesh::default();
     let side = vec3(0.08, height, 0.14);
-    mesh.mirrored_slabs(vec3(half + 0.03, 0.0, -0.05), side, &rail);
+    mesh.mirrored_slabs(vec3(half + 0.03, 0.0, -0.05), side, &frame_surface);
     mesh.board(
         half + 0.07,
         [height - 0.02, height + 0.06],
         [-0.12, 0.02],
-        &rail,
+        &frame_surface,
     );
     let leaf = parts::piece("door", rng);
     let hinge = vec3(0.01 - half, 0.0, if angle > 0.0 { -0.07 } else { 0.045 });
