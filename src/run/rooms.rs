@@ -1,4 +1,4 @@
-//! `rooms`: writes the built-in rooms as files.
+//! The `rooms` command: writes the built-in rooms as a folder of frames.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -35,16 +35,16 @@ pub(crate) struct RoomsArgs {
     pub threads: ThreadArgs,
 }
 
-/// Writes the rooms in the common interface. Each thread keeps one frame in memory.
+/// Writes the rooms as a folder of frames, in the program's common dataset format. Each thread keeps one frame in memory.
 ///
 /// # Errors
-/// If the folder has frames already, or a file cannot be written.
+/// If the folder has frames already and `--force` is not set, a room cannot be rendered, or a file cannot be written.
 pub(crate) fn rooms(args: &RoomsArgs, progress: &Progress) -> Result<Outcome> {
-    let list = args.out.join(FRAMES);
-    if !args.force && list.exists() {
+    let frames_file = args.out.join(FRAMES);
+    if !args.force && frames_file.exists() {
         let problem =
             "the folder has frames already; --force overwrites them, another --out keeps both";
-        return Err(Error::data(list.display(), problem));
+        return Err(Error::data(frames_file.display(), problem));
     }
     let workers = pool(args.threads.threads)?;
     let rooms: BTreeMap<FrameId, Room> = args.rooms.all().collect();
@@ -62,9 +62,12 @@ pub(crate) fn rooms(args: &RoomsArgs, progress: &Progress) -> Result<Outcome> {
             .collect::<Result<_>>()
     })?;
     drop(bar);
-    // The frames of a scene share a file of names, which two threads must not write at the same time.
-    let scenes = frames.iter().map(|frame| (&*frame.scene, &frame.names));
-    for (scene, names) in scenes.collect::<BTreeMap<_, _>>() {
+    // The frames of a scene share one file of segment names: write it once, after the threads have finished.
+    let names_by_scene: BTreeMap<_, _> = frames
+        .iter()
+        .map(|frame| (&*frame.scene, &frame.names))
+        .collect();
+    for (scene, names) in names_by_scene {
         frame_folder::write_segment_names(&args.out, scene, names)?;
     }
     let info = json!({
@@ -83,15 +86,16 @@ pub(crate) fn rooms(args: &RoomsArgs, progress: &Progress) -> Result<Outcome> {
     ))
 }
 
-/// A frame whose files are written.
+/// Record of a frame whose files have been written.
 struct WrittenFrame {
-    /// Line in `frames.jsonl`.
+    /// JSON object in `frames.jsonl`.
     line: Map<String, Value>,
     scene: String,
-    /// Names of the segments of the scene.
+    /// Segment names of the scene, by segment ID.
     names: Arc<BTreeMap<u32, SegmentName>>,
 }
 
+/// Renders a room and writes its files.
 fn write_frame(args: &RoomsArgs, room: &Room) -> Result<WrittenFrame> {
     let frame = room.frame()?;
     let output = FrameOutput {
@@ -100,13 +104,13 @@ fn write_frame(args: &RoomsArgs, room: &Room) -> Result<WrittenFrame> {
         frame: room.view(),
     };
     let mut line = output.line(frame.rgb.width(), frame.rgb.height());
-    let codes = output.write("rgb", "png", &png(&frame.rgb)?)?;
-    // The EXR file is the frame if the room has one; the PNG file is then only a preview.
-    let image = match room.light() {
+    let png_file = output.write("rgb", "png", &png(&frame.rgb)?)?;
+    // A room with linear light is read from its EXR file; its PNG file is only a preview.
+    let rgb_file = match room.light() {
         Some(light) => output.write("rgb", "exr", &exr(&light)?)?,
-        None => codes,
+        None => png_file,
     };
-    line.insert("rgb".to_owned(), json!(image));
+    line.insert("rgb".to_owned(), json!(rgb_file));
     if let Some(depth) = &frame.depth {
         output.write_depth(&mut line, depth, frame.depth_kind)?;
     }

@@ -9,16 +9,15 @@ use super::learned_rate::LearnedRate;
 use super::quota::{INITIAL_TOKENS, MAX_TOKENS, Quota, QuotaWindow};
 use super::rate_limits::{PaceAdvice, RateLimits};
 
-/// Maximum spacing between requests because of the limits that a server reports, so that one report cannot slow down the whole run.
+/// Maximum spacing derived from reported limits. It keeps a single extreme report from slowing down the whole run.
 const MAX_SPACING: Duration = Duration::from_secs(5);
 
 /// Weight of the newest reply in the moving average of tokens per request.
 const NEWEST_WEIGHT: f64 = 0.1;
 
-/// Rate limiter of an endpoint, directly before a request is sent. Requests pass one by one, in the order of their arrival.
+/// Rate limiter of an endpoint, the last step before a request is sent. Requests pass one by one, in arrival order.
 ///
-/// Each request waits for the user's quota, for the pauses that the endpoint asks for, for the learned rate of the endpoint, and for
-/// the limits that the endpoint reports.
+/// Each request waits for the user's quota, the endpoint's pauses, the learned rate and the reported limits.
 #[derive(Debug)]
 pub(in crate::ask) struct Gate {
     state: Mutex<State>,
@@ -30,14 +29,14 @@ pub(in crate::ask) struct Gate {
 struct State {
     quota: QuotaWindow,
     learned: LearnedRate,
-    /// End of the pause in which no request passes, because the endpoint has no capacity.
+    /// End of the current pause: the endpoint has no capacity, or its reported limits call for a pause.
     paused_until: Instant,
-    /// Earliest time of the next request according to `reported_spacing`.
-    next_at: Instant,
-    /// Time between requests that follows from the limits that the endpoint reports.
+    /// Earliest time of the next request under `reported_spacing`.
+    spaced_until: Instant,
+    /// Time between requests, derived from the limits that the endpoint reports.
     reported_spacing: Duration,
     /// Moving average of tokens per request.
-    tokens: f64,
+    mean_tokens: f64,
     /// Time of the first refusal since the last success; `None` without one.
     refused_since: Option<Instant>,
 }
@@ -50,21 +49,22 @@ impl Gate {
                 quota: QuotaWindow::new(quota, now),
                 learned: LearnedRate::new(now, QuotaWindow::half_rate(quota)),
                 paused_until: now,
-                next_at: now,
+                spaced_until: now,
                 reported_spacing: Duration::ZERO,
-                tokens: INITIAL_TOKENS,
+                mean_tokens: INITIAL_TOKENS,
                 refused_since: None,
             }),
             queue: tokio::sync::Mutex::new(()),
         }
     }
 
-    /// Waits until a request may be sent, and returns the time of sending.
+    /// Waits until the request may be sent; returns the send time.
     pub(in crate::ask) async fn pass(&self) -> Instant {
         let _turn = self.queue.lock().await;
         loop {
             let turn = {
-                let (now, mut state) = (Instant::now(), self.state());
+                let now = Instant::now();
+                let mut state = self.state();
                 let turn = state.next_turn(now);
                 if turn <= now {
                     state.record_sent(now);
@@ -72,27 +72,30 @@ impl Gate {
                 }
                 turn
             };
-            // Replies that arrive during the sleep may move the turn: compute it again.
+            // Recompute the turn after the sleep: a reply that arrives in the meantime may move it.
             sleep_until(turn).await;
         }
     }
 
-    /// Time at which a request could be sent if no other request were waiting.
+    /// Earliest send time of a new request, ignoring the requests in the queue.
     pub(in crate::ask) fn ready_at(&self) -> Instant {
-        let (now, mut state) = (Instant::now(), self.state());
+        let now = Instant::now();
+        let mut state = self.state();
         state.next_turn(now).max(now)
     }
 
     /// Pauses all requests, because the endpoint has no capacity. The learned rate does not change.
     pub(in crate::ask) fn pause(&self, wait: Duration) {
-        let (now, mut state) = (Instant::now(), self.state());
+        let now = Instant::now();
+        let mut state = self.state();
         state.refused_since.get_or_insert(now);
         state.pause_until(now.checked_add(wait).unwrap_or(now));
     }
 
     /// Records that the request sent at `sent` was rate limited; `wait` is the wait that the endpoint asked for.
     pub(in crate::ask) fn record_rate_limited(&self, sent: Instant, wait: Option<Duration>) {
-        let (now, mut state) = (Instant::now(), self.state());
+        let now = Instant::now();
+        let mut state = self.state();
         state.refused_since.get_or_insert(now);
         state.learned.record_refused(now, sent, wait);
     }
@@ -103,8 +106,9 @@ impl Gate {
         since.map_or(Duration::ZERO, |since| since.elapsed())
     }
 
-    /// Records the success of the request sent at `sent`, with its tokens and the limits that the response reports. Pauses longer than
-    /// `max_wait` are ignored.
+    /// Records the success of the request sent at `sent`: its tokens, and the limits that the response reports.
+    ///
+    /// A reported pause longer than `max_wait` is ignored.
     pub(in crate::ask) fn record_success(
         &self,
         sent: Instant,
@@ -112,15 +116,16 @@ impl Gate {
         limits: RateLimits,
         max_wait: Duration,
     ) {
-        let (now, mut state) = (Instant::now(), self.state());
+        let now = Instant::now();
+        let mut state = self.state();
         state.refused_since = None;
         if let Some(tokens) = tokens {
             state.quota.record_tokens(sent, tokens);
             let tokens = (tokens as f64).min(MAX_TOKENS);
-            state.tokens += NEWEST_WEIGHT * (tokens - state.tokens);
+            state.mean_tokens += NEWEST_WEIGHT * (tokens - state.mean_tokens);
         }
         state.learned.record_accepted(now, sent);
-        state.reported_spacing = match limits.advice(state.tokens) {
+        state.reported_spacing = match limits.advice(state.mean_tokens) {
             PaceAdvice::Nothing => Duration::ZERO,
             PaceAdvice::Spacing(spacing) => spacing.min(MAX_SPACING),
             PaceAdvice::Pause(wait) => {
@@ -145,13 +150,13 @@ impl State {
             .next_turn(now)
             .max(self.learned.next_turn())
             .max(self.paused_until)
-            .max(self.next_at)
+            .max(self.spaced_until)
     }
 
     fn record_sent(&mut self, now: Instant) {
         self.quota.record_sent(now);
         self.learned.record_sent(now);
-        self.next_at = now + self.reported_spacing;
+        self.spaced_until = now + self.reported_spacing;
     }
 
     fn pause_until(&mut self, until: Instant) {

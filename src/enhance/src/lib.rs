@@ -1,4 +1,4 @@
-//! Stage 3, enhance: a degraded image → an enhanced one, by the user's ONNX model on ONNX Runtime's CPU provider.
+//! Stage 3, enhance: runs the user's ONNX model on degraded images, with ONNX Runtime's CPU execution provider.
 //!
 //! ```text
 //! RuntimeSearch::open ─► Runtime ─┐
@@ -6,28 +6,35 @@
 //! ModelFile::read ─► name, digest ┘
 //! ```
 //!
-//! The convention of a model (how its input is prepared and its output is decoded) comes from its graph (layout, type, sizes), else from a
-//! sidecar `MODEL.onnx.toml`, else from a preset (`zero-dce:FILE`), else from the convention of most published models (RGB, 0..1). A model
-//! that still lacks a statement is refused, with its name. A run takes these steps from the dark image to the result; those in brackets are
-//! rare:
+//! The convention of a model defines how its input is prepared and how its output is decoded. Each setting is taken from the first source
+//! that defines it:
+//!
+//! 1. the graph (layout, element type, sizes)
+//! 2. a sidecar `MODEL.onnx.toml`
+//! 3. a preset (`zero-dce:FILE`)
+//! 4. the convention of most published models (RGB, 0..1)
+//!
+//! A model with a setting that no source defines is refused; the error names the setting.
+//!
+//! An image passes these steps; those in brackets are rare:
 //!
 //! ```text
-//! window ─ [input = EXPRESSION] ─ [luma] ─ range, mean, std ─► InputEncoding      ─┐
-//! number, map, noise, from = EXPRESSION ────────────────────► FurtherInput ─┴─► Graph
+//! window ─ [input = EXPRESSION] ─ [luma] ─ range, mean, std ─► InputEncoding ─┐
+//! number, map, noise, from = EXPRESSION ─────────────────────► FurtherInput ──┴─► Graph
 //! Graph ─► OutputDecoding (range) ─ [image = EXPRESSION] ─ [luma] ─ clamp, rounding ─► Composition
 //! ```
 //!
-//! [`ModelFile::read`] works without ONNX Runtime, so a file that is not an ONNX model is refused before a library is searched or
-//! installed, and a resumed run can compare the model's digest.
+//! [`ModelFile::read`] works without ONNX Runtime. A file that is not an ONNX model is therefore refused before ONNX Runtime is located or
+//! installed, and a resumed run can check the model's digest without it.
 //!
-//! [`Enhancer::enhance`] plans how an image reaches the model (`sizing`): whole, padded, in tiles, or resized if a flag allows it.
-//! Properties that a graph does not declare are found by trial: the accepted multiple or traced size (`sizing/size_search`,
-//! `files/traced_sizes`), and the distance up to which pixels influence each other (`sizing/reach`). `limits` estimates the memory of a run
-//! in advance and limits its time; `libraries` checks a library before loading it.
+//! [`Enhancer::enhance`] passes an image to the model whole, padded, in tiles, or resized if a flag allows it (`sizing`). Trial inferences
+//! find properties that a graph does not declare: the required multiple of the input size or the size fixed by tracing
+//! (`sizing/size_search`, `files/traced_sizes`), and the receptive field (`sizing/reach`). `limits` estimates the memory of an inference in
+//! advance and limits its time. `libraries` checks a shared library before loading it.
 //!
-//! A wrong convention gives a wrong image and no error. So a model is tried on dark frames before a run ([`Enhancer::probe`]), and its
-//! images are checked during the run ([`Usage::judge`]), both by the rules in `probes/plausible`. `probes/doctor` draws the model's images
-//! in each convention.
+//! A wrong convention gives a wrong image, not an error. Each model is therefore tested on dark frames before a run
+//! ([`Enhancer::probe`]), and its images are checked during the run ([`Usage::judge`]). Both use the rules in `probes/plausible`.
+//! `probes/doctor` renders the model's images under each convention.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test may panic"))]
 
@@ -63,6 +70,6 @@ pub use probes::{
 pub use settings::{EnhancerArgs, ProbeArgs, RuntimeArgs, SizeArgs};
 pub use sizing::Tiling;
 
-/// Version of the input encoding and output decoding. It is raised whenever an enhanced pixel changes, so that stored results of
-/// older versions are not reused.
+/// Version of the input encoding and output decoding. Any change to enhanced pixels increments it, so that results stored by an older
+/// version are not reused.
 pub const VERSION: u32 = 2;

@@ -14,15 +14,15 @@ use darkqa_score::answers::record::Detail;
 
 /// Inputs of a README.
 pub(super) struct ReadmeInputs<'a> {
-    /// Name of the run, and of the folder in the archive.
+    /// Name of the run and of its folder in the archive.
     pub(super) name: &'a str,
-    /// The command that repeats the run, from [`command`].
+    /// Shell command that repeats the run, from [`command`].
     pub(super) command: &'a str,
-    /// The findings and the table by level, as Markdown.
+    /// Findings and table by level, in Markdown.
     pub(super) findings: &'a str,
-    /// Changes to the run and parts left out, one line each.
+    /// Differences between the bundle and the run, such as omitted files; one line each.
     pub(super) changes: &'a [String],
-    /// Names and sizes of the files.
+    /// Name and size of each file; the size in bytes.
     pub(super) files: &'a [(String, usize)],
 }
 
@@ -51,7 +51,7 @@ pub(super) fn readme(inputs: &ReadmeInputs<'_>) -> String {
     escape_hidden(&text).into_owned()
 }
 
-/// Shell lines in a fenced code block, whose fence is longer than any in the lines.
+/// Markdown code block of shell lines. Its fence is longer than any run of backticks in the lines.
 fn fenced(lines: &str) -> String {
     let mut fence = "```".to_owned();
     while lines.contains(&fence) {
@@ -60,7 +60,7 @@ fn fenced(lines: &str) -> String {
     format!("{fence}sh\n{lines}\n{fence}\n")
 }
 
-/// The levels and models of a run, from its trials.
+/// Levels and models in the trials of a run.
 #[derive(Default)]
 struct RunModels {
     levels: BTreeSet<AxisLevel>,
@@ -86,7 +86,7 @@ impl RunModels {
     }
 }
 
-/// The command that repeats a run, as far as its manifest states it.
+/// Shell command that repeats a run. Settings that the manifest does not record are missing from it.
 pub(super) fn command(manifest: &RunManifest, run: &AnyRun) -> String {
     let mut words = vec!["darkqa-eval".to_owned()];
     let asked = match run {
@@ -105,12 +105,15 @@ pub(super) fn command(manifest: &RunManifest, run: &AnyRun) -> String {
     if file.is_some() {
         words.extend(["--models", "models.toml"].map(str::to_owned));
     }
-    let seeing = asked.seeing.iter().filter(|model| !is_control(model));
-    for model in seeing.filter(|model| !is_in_file(model)) {
+    for model in asked
+        .seeing
+        .iter()
+        .filter(|model| !is_control(model) && !is_in_file(model))
+    {
         words.extend(["--model".to_owned(), word(model)]);
     }
     for model in asked.blind.iter().filter(|model| !is_in_file(model)) {
-        // The judge is a blind model, too, but has its own flag.
+        // A judge has trials without images, too, but is given with `--judge`.
         if Some(&**model) != judge {
             words.extend(["--blind-model".to_owned(), word(model)]);
         }
@@ -134,26 +137,30 @@ pub(super) fn command(manifest: &RunManifest, run: &AnyRun) -> String {
     if !levels.is_empty() {
         words.extend(["--levels".to_owned(), word(&levels.join(","))]);
     }
-    let more: Vec<String> = manifest
+    let other_settings: Vec<String> = manifest
         .identity
         .iter()
         .filter(|(flag, value)| {
-            // Digests identify files, which are named by the image flags.
-            let is_plain = value.as_str().is_none_or(|text| text.len() < 64);
-            let is_of_images = manifest.images.contains_key(flag.trim_start_matches("--"));
-            let is_named = words.contains(flag);
-            flag.starts_with("--") && !is_of_images && !is_named && is_plain && *flag != "--data"
+            // A string of 64 or more characters is a file's SHA-256 digest; the image flags have the file's path.
+            let is_digest = value.as_str().is_some_and(|text| text.len() >= 64);
+            let is_image_flag = manifest.images.contains_key(flag.trim_start_matches("--"));
+            let is_written = words.contains(flag);
+            flag.starts_with("--")
+                && !is_image_flag
+                && !is_written
+                && !is_digest
+                && *flag != "--data"
         })
         .flat_map(|(flag, value)| flag_words(flag, value))
         .collect();
-    words.extend(more);
+    words.extend(other_settings);
     let command = words.join(" ");
     file.map_or(command.clone(), |file| {
         format!("cat > models.toml <<'END'\n{file}END\n{command}")
     })
 }
 
-/// The settings of the models at endpoints, by name.
+/// Settings of the models at endpoints, by model name.
 fn remote_models(manifest: &RunManifest) -> BTreeMap<&String, &Value> {
     manifest
         .columns
@@ -164,14 +171,15 @@ fn remote_models(manifest: &RunManifest) -> BTreeMap<&String, &Value> {
         .collect()
 }
 
-/// The models file for a run whose models cannot be given by flags, because their names differ from those at the endpoints or their
-/// settings differ from each other. `None` if flags suffice.
+/// Content of a models file (TOML) for a run; `None` if flags suffice.
+///
+/// Flags do not suffice if models differ in their settings, or if a model has another name in the run than at its endpoint.
 fn models_file(
     remote: &BTreeMap<&String, &Value>,
     asked: &RunModels,
     judge: Option<&str>,
 ) -> Option<String> {
-    // The judge has its own flags.
+    // Flags define a model that is only a judge.
     let models: Vec<(&String, &Value)> = remote
         .iter()
         .map(|(name, content)| (*name, *content))
@@ -211,21 +219,22 @@ fn models_file(
     Some(text)
 }
 
+/// Settings of a model, without its name at the endpoint (`--model`).
 fn without_id(content: &Value) -> serde_json::Map<String, Value> {
     let mut content = content.as_object().cloned().unwrap_or_default();
     content.remove("--model");
     content
 }
 
-/// True if a model is a control of the observer, which is asked together with the observer.
+/// True if a model is a control of the built-in observer. `--model observer` includes its controls.
 fn is_control(model: &str) -> bool {
     model.starts_with("observer:")
 }
 
-/// The flags whose value is the same for all models.
+/// Shell words for the flags that have the same value for all models.
 fn common_flags(remote: &BTreeMap<&String, &Value>) -> Vec<String> {
-    let remote: Vec<&Value> = remote.values().copied().collect();
-    let Some(first) = remote.first().and_then(|first| first.as_object()) else {
+    let models: Vec<&Value> = remote.values().copied().collect();
+    let Some(first) = models.first().and_then(|first| first.as_object()) else {
         return Vec::new();
     };
     let shared: BTreeMap<&String, &Value> = first
@@ -233,7 +242,7 @@ fn common_flags(remote: &BTreeMap<&String, &Value>) -> Vec<String> {
         .filter(|(flag, value)| {
             flag.starts_with("--")
                 && *flag != "--model"
-                && remote
+                && models
                     .iter()
                     .all(|other| other.get(flag.as_str()) == Some(value))
         })
@@ -244,7 +253,9 @@ fn common_flags(remote: &BTreeMap<&String, &Value>) -> Vec<String> {
         .collect()
 }
 
-/// Shell words for a flag with its value. A list repeats the flag; an unset value gives no words.
+/// Shell words for a flag with its value. A list repeats the flag; null, false and objects give no words.
+///
+/// A flag with a keyed form is written as a key: `--noise gain=0.5` for `--gain`.
 fn flag_words(flag: &str, value: &Value) -> Vec<String> {
     let text = match value {
         Value::Null | Value::Bool(false) | Value::Object(_) => return Vec::new(),
@@ -260,10 +271,10 @@ fn flag_words(flag: &str, value: &Value) -> Vec<String> {
     };
     let keyed = flag.strip_prefix("--").and_then(keyed_form);
     match (keyed, text) {
-        (Some((keyed, key)), None) => vec![format!("--{}", keyed.name), key.to_owned()],
-        // A text with a comma cannot be written as a key, because commas separate keys.
-        (Some((keyed, key)), Some(text)) if !text.contains(',') => {
-            vec![format!("--{}", keyed.name), word(&format!("{key}={text}"))]
+        (Some((parent, key)), None) => vec![format!("--{}", parent.name), key.to_owned()],
+        // Commas separate keys, so the value of a key cannot contain one.
+        (Some((parent, key)), Some(text)) if !text.contains(',') => {
+            vec![format!("--{}", parent.name), word(&format!("{key}={text}"))]
         }
         (_, None) => vec![flag.to_owned()],
         (_, Some(text)) => vec![flag.to_owned(), word(&text)],
@@ -279,13 +290,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn no_text_ends_a_block_of_code() {
+    fn fence_outgrows_backticks_in_lines() {
         assert_eq!(fenced("a"), "```sh\na\n```\n");
         assert_eq!(fenced("a ``` b"), "````sh\na ``` b\n````\n");
     }
 
     #[test]
-    fn flags_are_words_of_a_shell() {
+    fn flag_words_quote_and_repeat_values() {
         assert_eq!(
             flag_words("--x", &serde_json::json!("a b")),
             ["--x", "'a b'"]
@@ -296,6 +307,10 @@ mod tests {
         );
         assert_eq!(flag_words("--x", &serde_json::json!(true)), ["--x"]);
         assert!(flag_words("--x", &Value::Null).is_empty());
+    }
+
+    #[test]
+    fn flag_words_use_keyed_forms() {
         let gain = flag_words("--gain", &serde_json::json!(0.5));
         assert_eq!(gain, ["--noise", "gain=0.5"]);
         let fixed = flag_words("--fixed", &serde_json::json!(true));

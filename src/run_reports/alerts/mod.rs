@@ -1,4 +1,4 @@
-//! Alerts above a report: differences between its runs, and faults of its numbers ([`alerts`]).
+//! Alerts at the top of a report: problems of its runs, differences between them, and limitations of its numbers ([`alerts`]).
 
 mod adapted;
 mod confidence;
@@ -34,7 +34,7 @@ use darkqa_score::photographs::PhotographedSet;
 use darkqa_score::photographs::pair_darkness::PairDarkness;
 use darkqa_score::suggested_scenes::SuggestedScenes;
 
-/// All alerts of a report on questions with choices, in the order of their kinds.
+/// All alerts of a report on multiple-choice questions, ordered by kind.
 pub(super) fn alerts(combined: &Combined, findings: &Findings<'_>) -> Vec<Alert> {
     let mut alerts = run_alerts(combined);
     alerts.extend(joining_alerts(combined));
@@ -58,7 +58,7 @@ pub(super) fn alerts(combined: &Combined, findings: &Findings<'_>) -> Vec<Alert>
         findings.grid.clusters,
         findings.unit,
     ));
-    alerts.extend(set_alert(findings.set));
+    alerts.extend(dark_photographs_alert(findings.set));
     alerts.extend(many_models_alert(findings));
     alerts.extend(
         findings
@@ -71,40 +71,47 @@ pub(super) fn alerts(combined: &Combined, findings: &Findings<'_>) -> Vec<Alert>
     alerts
 }
 
-/// All alerts of a report on questions without true answers, in the order of their kinds.
-pub(super) fn alerts_without_truths(combined: &Combined, found: &SelfAgreement<'_>) -> Vec<Alert> {
+/// All alerts of a report on questions without ground-truth answers, ordered by kind. Such a report measures self-agreement.
+pub(super) fn alerts_without_truths(
+    combined: &Combined,
+    agreement: &SelfAgreement<'_>,
+) -> Vec<Alert> {
     let mut alerts = run_alerts(combined);
     alerts.extend(joining_alerts(combined));
-    alerts.extend(replies::reply_alerts(&found.health, "do not agree"));
+    alerts.extend(replies::reply_alerts(&agreement.health, "do not agree"));
     alerts.extend(replies::broken_off_alert(combined));
     alerts.extend(parsing::parsing_alerts(combined));
     alerts.extend(constraints::constraint_alerts(
         &combined.runs,
         &combined.trials,
     ));
-    alerts.extend(cluster_alerts(combined, found.grid.clusters, found.unit));
-    alerts.extend(set_alert(found.set));
+    alerts.extend(cluster_alerts(
+        combined,
+        agreement.grid.clusters,
+        agreement.unit,
+    ));
+    alerts.extend(dark_photographs_alert(agreement.set));
     alerts.sort_by_key(|alert| alert.kind);
     alerts
 }
 
-/// The alert that there are too many models to compare them with each other.
+/// Alert for a report with too many models for pairwise comparisons.
 fn many_models_alert(findings: &Findings<'_>) -> Option<Alert> {
     let text = "Too many models to compare them with each other: no pair of them is tested, and none is called best. Reports of fewer \
                 models do both.";
     (!compares_models(&findings.grid)).then(|| Alert::new(AlertKind::Models, text))
 }
 
-/// The alert that the photographs of the set were taken in the dark.
-fn set_alert(set: PhotographedSet) -> Option<Alert> {
+/// Alert for a set of photographs that were taken in the dark.
+fn dark_photographs_alert(set: PhotographedSet) -> Option<Alert> {
     set.notice().map(|text| Alert::new(AlertKind::Pairs, text))
 }
 
-/// Alerts about too few clusters for reliable intervals, questions about a single frame, and frames without the scenes that their names
-/// suggest. A report without replies has no clusters and gets no alert about them.
+/// Alerts about too few clusters for reliable intervals, about a single frame, and about missing scenes. Without replies, the number of
+/// clusters is 0 and gets no alert.
 fn cluster_alerts(combined: &Combined, clusters: usize, unit: ClusterUnit) -> Vec<Alert> {
     let frames: BTreeSet<&FrameId> = combined.questions.iter().map(|one| &one.frame).collect();
-    let few = if clusters == 0 {
+    let few_clusters = if clusters == 0 {
         None
     } else if clusters < MIN_SCENES {
         Some(format!(
@@ -117,14 +124,15 @@ fn cluster_alerts(combined: &Combined, clusters: usize, unit: ClusterUnit) -> Ve
     } else {
         None
     };
-    few.into_iter()
-        .chain(unnamed_scenes(combined, &frames))
+    few_clusters
+        .into_iter()
+        .chain(missing_scenes(combined, &frames))
         .map(|text| Alert::new(AlertKind::Clusters, text))
         .collect()
 }
 
-/// The sentence about scenes that frame names suggest but no question states, or about frames without a scene if other frames have one.
-fn unnamed_scenes(combined: &Combined, frames: &BTreeSet<&FrameId>) -> Option<String> {
+/// Sentence about missing scenes: if no question has a scene, but the frame names suggest some; or if only some frames have a scene.
+fn missing_scenes(combined: &Combined, frames: &BTreeSet<&FrameId>) -> Option<String> {
     let in_scenes: BTreeSet<&FrameId> = combined
         .questions
         .iter()
@@ -152,7 +160,7 @@ fn unnamed_scenes(combined: &Combined, frames: &BTreeSet<&FrameId>) -> Option<St
     })
 }
 
-/// Alerts based on manifests and questions, for runs of either kind.
+/// Alerts about the runs themselves, for multiple-choice and open-ended questions: from manifests, questions and trials, not from scores.
 pub(super) fn run_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     let mut alerts = progress_alerts(&joined.runs);
     alerts.extend(cost_alerts(&joined.runs));
@@ -186,7 +194,7 @@ fn cost_alerts(runs: &[JoinedRun]) -> Vec<Alert> {
         .collect()
 }
 
-/// Alerts about joining the runs: models listed under several names, models left out, and runs that add no replies.
+/// Alerts about combining the runs: models under several names, omitted models, and runs whose replies are all in other runs.
 pub(super) fn joining_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     let mut alerts: Vec<Alert> = joined
         .runs
@@ -206,7 +214,7 @@ pub(super) fn joining_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     alerts
 }
 
-/// Alerts about folders that were named more than once on the command line; takes each name with its number of times.
+/// Alerts about folders that were given more than once on the command line. `folders` has each name with its number of occurrences.
 pub(super) fn duplicate_folder_alerts(folders: &[(String, usize)]) -> Vec<Alert> {
     folders
         .iter()
@@ -221,7 +229,7 @@ pub(super) fn duplicate_folder_alerts(folders: &[(String, usize)]) -> Vec<Alert>
         .collect()
 }
 
-/// Alerts about changes made to the images of the runs when they were read.
+/// Alerts about changes made to images when their files were read. Runs with the same change share an alert.
 fn input_alerts(runs: &[JoinedRun]) -> Vec<Alert> {
     let mut lines = BTreeMap::<String, Vec<&str>>::new();
     for run in runs {
@@ -241,12 +249,13 @@ fn input_alerts(runs: &[JoinedRun]) -> Vec<Alert> {
         .collect()
 }
 
+/// One alert for each run that is not complete.
 fn progress_alerts(runs: &[JoinedRun]) -> Vec<Alert> {
     runs.iter()
         .filter(|run| run.manifest.status != Status::Complete)
         .map(|run| {
             let (status, counts) = (run.manifest.status, run.manifest.counts);
-            // A run merged from some of its shards has answers to all of their trials.
+            // A merge of only some shards is not complete, but has no trials left to ask.
             let rest = if counts.answered < counts.trials {
                 " The same command asks the rest."
             } else {

@@ -1,4 +1,4 @@
-//! True option of each question of a set: [`find_truths`].
+//! Correct option of each question in a ready-made set: [`find_truths`].
 
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ use crate::dataset::ready_made::omissions::{OmissionReason, Omissions};
 use crate::types::Choices;
 use crate::types::text::excerpt;
 
-/// Question of a row with its choices and the true one.
+/// Question of a row with its choices, including the correct one.
 #[derive(Debug)]
 pub(in crate::dataset::ready_made) struct ParsedQuestion {
     /// Index of the row in the table.
@@ -24,22 +24,23 @@ pub(in crate::dataset::ready_made) struct ParsedQuestion {
     pub(in crate::dataset::ready_made) choices: Choices,
 }
 
-/// Questions of a set with their true options.
+/// Questions of a set with their correct options.
 #[derive(Debug, Default)]
 pub(in crate::dataset::ready_made) struct Truths {
     pub(in crate::dataset::ready_made) questions: Vec<ParsedQuestion>,
-    /// Columns of the answers with their formats, for the summary.
+    /// Answer columns with their formats as text, for the summary.
     pub(in crate::dataset::ready_made) columns: Vec<String>,
 }
 
-/// Minimum share of questions that begin with a verb, for the digits 0 and 1 to mean no and yes (chosen).
+/// Minimum share of questions that begin with a verb, as yes/no questions do (heuristic). Below it, 0 and 1 do not mean no and yes.
 const MIN_VERB_SHARE: f64 = 0.9;
 
-/// Finds the true options of all questions. Answers of questions with options have one common format, and answers of yes/no questions
-/// another.
+/// Finds the correct option of each question.
+///
+/// The answers to multiple-choice questions share one format. The answers to yes/no questions have a format of their own.
 ///
 /// # Errors
-/// If there are no answers, no format fits any row, or two formats fit and disagree.
+/// If there are no answers, no format fits any row, or two formats fit but identify different options.
 pub(in crate::dataset::ready_made) fn find_truths(
     table: &Table,
     roles: &Roles,
@@ -76,14 +77,15 @@ pub(in crate::dataset::ready_made) fn find_truths(
         })
         .partition::<Vec<Item>, _>(|item| item.options.is_some());
     let mut truths = Truths::default();
-    answer_with_options(table, roles, format, with_options, omissions, &mut truths)?;
-    answer_without_options(table, roles, without_options, omissions, &mut truths)?;
+    add_choice_questions(table, roles, format, with_options, omissions, &mut truths)?;
+    add_yes_no_questions(table, roles, without_options, omissions, &mut truths)?;
     truths.questions.sort_by_key(|question| question.row);
     Ok(truths)
 }
 
-/// True if the letters in a question label things in the image, because its answer is yes or no and not one of the lettered texts.
+/// True if lettered texts in a question are labels in the image, not options: the answer is yes or no, and identifies none of them.
 fn letters_are_not_options(table: &Table, roles: &Roles, item: &Item) -> bool {
+    // `whole` is set only if the options were found in the question's text.
     let Some(options) = item.options.as_deref().filter(|_| item.whole.is_some()) else {
         return false;
     };
@@ -137,16 +139,16 @@ fn are_texts(table: &Table, column: &Column) -> bool {
         .all(|row| matches!(column.cell(row), Cell::Text(_)))
 }
 
-/// Pairs the items with their answers. Items without an answer, or with several, are added to the omissions.
+/// Pairs each item with its answer. Items without an answer, or with several, are added to the omissions.
 ///
 /// # Errors
-/// If no item has an answer. The error suggests the flag in `other`, if given, to read the answers of another column.
+/// If no item has an answer. The error suggests `other_column_flag`, the flag to read another column, if there is one.
 fn with_answers(
     table: &Table,
     column: &Column,
     items: Vec<Item>,
     omissions: &mut Omissions,
-    other: Option<String>,
+    other_column_flag: Option<String>,
 ) -> Result<Vec<(Item, String)>, String> {
     let count = items.len();
     let mut absent = Vec::new();
@@ -161,7 +163,7 @@ fn with_answers(
         }
     }
     if absent.len() == count && count > 0 {
-        let remedy = other.map_or_else(
+        let remedy = other_column_flag.map_or_else(
             || "a test split without them? --read split names another, and --ask FILE asks questions without answers about every image".to_owned(),
             |flag| format!("{flag} reads those of another column"),
         );
@@ -178,8 +180,8 @@ fn with_answers(
     Ok(found)
 }
 
-/// Finds the true options of questions with options.
-fn answer_with_options(
+/// Adds the multiple-choice questions with their correct options to `truths`.
+fn add_choice_questions(
     table: &Table,
     roles: &Roles,
     format: &CellFormat,
@@ -191,17 +193,17 @@ fn answer_with_options(
         return Ok(());
     }
     let column = answer_column::option_column(table, roles, &items)?;
-    let other = answer_column::suggest_column(table, roles, &items);
-    let items = with_answers(table, column, items, omissions, other)?;
-    let format = ColumnFormat::choose(table, column, format, &items)?;
-    let name = format.format.name();
+    let other_column_flag = answer_column::suggest_column(table, roles, &items);
+    let items = with_answers(table, column, items, omissions, other_column_flag)?;
+    let column_format = ColumnFormat::choose(table, column, format, &items)?;
+    let name = column_format.format.name();
     truths.columns.push(format!("{} ({name})", column.name));
     truths.questions.reserve(items.len());
     for (item, answer) in items {
         let Item {
             row, text, options, ..
         } = item;
-        match format.choices(&answer, &options.unwrap_or_default()) {
+        match column_format.choices(&answer, &options.unwrap_or_default()) {
             Ok(choices) => truths.questions.push(ParsedQuestion { row, text, choices }),
             Err(problem) => omissions.add(OmissionReason::Bad, || {
                 format!("{}: {problem}", table.place(row))
@@ -211,20 +213,20 @@ fn answer_with_options(
     Ok(())
 }
 
-/// Format of the answers in a column, the same in all rows.
+/// Format of the answers in a column; all rows share it.
 struct ColumnFormat {
     format: AnswerFormat,
     /// True if the user chose the format with `--map`.
     is_chosen: bool,
     /// Number of rows that the format fits.
-    fit: usize,
+    fitting_rows: usize,
 }
 
 impl ColumnFormat {
-    /// The format given with `--map`, else the one that fits all rows, else the one that fits most rows.
+    /// Chooses the format given with `--map`, else the one that fits all rows, else the one that fits most rows.
     ///
     /// # Errors
-    /// If the format fits no row, or two formats fit and disagree.
+    /// If the format fits no row, or two formats fit but identify different options.
     fn choose(
         table: &Table,
         column: &Column,
@@ -242,10 +244,10 @@ impl ColumnFormat {
         let chosen = match format {
             CellFormat::Answer(format) => Self::new(*format, true, &rows),
             CellFormat::Inferred | CellFormat::Split(_) => {
-                // In this program's own format answers are texts, so text wins over a format that fits as many rows.
+                // Answers in this program's own format are texts: text wins if it fits at least half of the rows.
                 let texts = (is_native_format(table) && are_texts(table, column))
                     .then(|| Self::new(AnswerFormat::Text, false, &rows))
-                    .filter(|texts| texts.fit > 0 && 2 * texts.fit >= rows.len());
+                    .filter(|texts| texts.fitting_rows > 0 && 2 * texts.fitting_rows >= rows.len());
                 if let Some(texts) = texts {
                     texts
                 } else {
@@ -257,7 +259,7 @@ impl ColumnFormat {
             }
         };
         match items.first() {
-            Some((item, answer)) if chosen.fit == 0 => Err(format!(
+            Some((item, answer)) if chosen.fitting_rows == 0 => Err(format!(
                 "{}: the answer {:?} (column {:?}) is not one of the options {}, neither by letter nor by text nor by number",
                 table.place(item.row),
                 excerpt(answer, 60),
@@ -269,16 +271,20 @@ impl ColumnFormat {
     }
 
     fn new(format: AnswerFormat, is_chosen: bool, rows: &[RowAnswer<'_>]) -> Self {
-        let mut new = Self {
+        let mut column_format = Self {
             format,
             is_chosen,
-            fit: 0,
+            fitting_rows: 0,
         };
-        new.fit = rows
+        column_format.fitting_rows = rows
             .iter()
-            .filter(|row| new.choice_index(row.answer, row.options).is_some())
+            .filter(|row| {
+                column_format
+                    .choice_index(row.answer, row.options)
+                    .is_some()
+            })
             .count();
-        new
+        column_format
     }
 
     /// Index of the option that an answer identifies.
@@ -290,7 +296,7 @@ impl ColumnFormat {
         }
     }
 
-    /// Choices of a question, with the option that the answer identifies as the true one.
+    /// Choices of a question, with the option that the answer identifies marked as correct.
     ///
     /// # Errors
     /// If the answer does not identify an option, or the options are not valid choices.
@@ -303,7 +309,7 @@ impl ColumnFormat {
                 excerpt(answer, 60),
                 options.excerpt(120),
                 self.format.name(),
-                self.fit
+                self.fitting_rows
             )),
         }
     }
@@ -312,12 +318,13 @@ impl ColumnFormat {
 /// Finds the format that fits all rows, else the one that fits most rows.
 ///
 /// # Errors
-/// If two formats fit and disagree: both formats, and the index of the row.
+/// The two formats and the index of the row, if two formats fit but identify different options in that row.
 fn infer_format(rows: &[RowAnswer<'_>]) -> Result<AnswerFormat, ([AnswerFormat; 2], usize)> {
     match find_format(rows) {
         FormatSearch::Fits(format) => Ok(format),
         FormatSearch::Ambiguous { formats, row } => Err((formats, row)),
         FormatSearch::None { best, unfit } => {
+            // Search the rows that `best` fits once more: another format may fit all of them, too, and disagree.
             let (indices, fitting): (Vec<usize>, Vec<RowAnswer<'_>>) = rows
                 .iter()
                 .enumerate()
@@ -332,7 +339,7 @@ fn infer_format(rows: &[RowAnswer<'_>]) -> Result<AnswerFormat, ([AnswerFormat; 
     }
 }
 
-/// Error message for an answer that identifies different options in two formats.
+/// Error message for an answer that identifies a different option in each of two formats.
 fn ambiguous_answer(
     table: &Table,
     item: &Item,
@@ -341,17 +348,19 @@ fn ambiguous_answer(
     column: &Column,
 ) -> String {
     let [one, other] = formats.map(AnswerFormat::name);
-    let [first, second] = formats.map(|format| map_flag(Role::Answer, &column.name, Some(format)));
+    let [one_flag, other_flag] =
+        formats.map(|format| map_flag(Role::Answer, &column.name, Some(format)));
     format!(
-        "{}: the answer {:?} may be read as {one} or as {other}, which differ among the options {}; {first} or {second} says which is meant",
+        "{}: the answer {:?} may be read as {one} or as {other}, which differ among the options {}; {one_flag} or {other_flag} says which is meant",
         table.place(item.row),
         excerpt(answer, 60),
         options.excerpt(120),
     )
 }
 
-/// Finds the true options of yes/no questions. Other questions without options are open, and added to the omissions.
-fn answer_without_options(
+/// Adds the yes/no questions with their correct options to `truths`. The other questions without options are open-ended: they are added
+/// to the omissions.
+fn add_yes_no_questions(
     table: &Table,
     roles: &Roles,
     items: Vec<Item>,
@@ -363,18 +372,18 @@ fn answer_without_options(
     }
     let column = answer_column::yes_or_no_column(table, roles, &items)?;
     let items = with_answers(table, column, items, omissions, None)?;
-    let verbs = items
+    let verb_questions = items
         .iter()
         .filter(|(item, _)| asks_yes_or_no(last_line(&item.text)))
         .count();
-    let are_digits = verbs as f64 >= MIN_VERB_SHARE * items.len() as f64
+    let digits_mean_yes_no = verb_questions as f64 >= MIN_VERB_SHARE * items.len() as f64
         && items
             .iter()
             .all(|(_, answer)| digit_index(answer).is_some());
     let yes_and_no: Arc<[String]> = ["yes", "no"].map(str::to_owned).into();
     let mut count = 0;
     for (Item { row, text, .. }, answer) in items {
-        let digit = if are_digits {
+        let digit = if digits_mean_yes_no {
             digit_index(&answer)
         } else {
             None
@@ -391,7 +400,7 @@ fn answer_without_options(
         }
     }
     if count > 0 {
-        let digits = if are_digits { ", 1 is yes" } else { "" };
+        let digits = if digits_mean_yes_no { ", 1 is yes" } else { "" };
         truths
             .columns
             .push(format!("{} (yes/no{digits})", column.name));
@@ -399,7 +408,7 @@ fn answer_without_options(
     Ok(())
 }
 
-/// Last line of a text, which is the question if a hint comes first.
+/// Last line of a text: the question, even if a hint precedes it.
 fn last_line(text: &str) -> &str {
     text.lines().next_back().unwrap_or(text)
 }

@@ -4,7 +4,7 @@ use std::fmt;
 
 use crate::conventions::{ElementType, TensorLayout};
 
-/// Maximum number of channels of an output; chosen (Zero-DCE's curves have 24).
+/// Maximum number of channels of an output (heuristic: Zero-DCE's curve maps have 24).
 const MAX_CHANNELS: usize = 64;
 
 /// An input or output of a graph.
@@ -12,7 +12,7 @@ const MAX_CHANNELS: usize = 64;
 pub(crate) struct Port {
     pub(crate) name: String,
     pub(crate) element: ElementType,
-    /// Dimensions; empty for a scalar, and if the graph does not declare the rank.
+    /// Dimensions; empty for a scalar and for an undeclared rank.
     pub(crate) dims: Vec<Dim>,
 }
 
@@ -21,7 +21,7 @@ pub(crate) struct Port {
 pub(crate) enum Dim {
     /// Fixed size.
     Known(usize),
-    /// Dynamic size, with its symbolic name in the graph, which may be empty.
+    /// Dynamic size with its symbolic name in the graph; the name may be empty.
     Free(String),
 }
 
@@ -69,28 +69,30 @@ impl Port {
     /// Layout of an image with `channels` channels; `None` if the dimensions do not determine it.
     pub(crate) fn layout(&self, channels: usize) -> Option<TensorLayout> {
         let mut fitting = TensorLayout::ALL.into_iter().filter(|layout| {
+            let [channel_axis, _, _] = layout.axes();
             self.dims.len() == layout.rank()
-                && self.dims[layout.axes()[0]].known() == Some(channels)
+                && self.dims[channel_axis].known() == Some(channels)
                 && (layout.rank() == 3 || self.dims[0].can_be(1))
         });
-        // If two dimensions can be the channels, the layout is ambiguous.
+        // The layout is ambiguous if a second one fits.
         fitting.next().filter(|_| fitting.next().is_none())
     }
 
-    /// True if the port can be an RGB image; false for a grey image, which has a dimension of 1 instead of 3.
+    /// True if the port can be an RGB image: one of the last three dimensions can be 3, and none is 1 (a grey image).
     pub(crate) fn may_be_image(&self) -> bool {
         let last = &self.dims[self.dims.len().saturating_sub(3)..];
         let is_grey = last.iter().any(|dim| dim.known() == Some(1));
         (3..=4).contains(&self.dims.len()) && !is_grey && last.iter().any(|dim| dim.can_be(3))
     }
 
-    /// True if the port can be an image in this layout with `count` channels and this height and width.
+    /// True if the port can be an output image in this layout, with `count` channels and the height and width of the input.
     pub(crate) fn can_be_image(
         &self,
         layout: TensorLayout,
         count: usize,
         [height, width]: [&Dim; 2],
     ) -> bool {
+        // Without declared dimensions any shape is possible.
         let [channels, rows, columns] = layout.axes();
         let is_shape_possible = self.dims.is_empty()
             || self.dims.len() == layout.rank()
@@ -102,18 +104,18 @@ impl Port {
         is_shape_possible && self.element.is_output_type()
     }
 
-    /// True if one of the dimensions `sides` is fixed to a small number while the other and the sides of the input are dynamic: the small
-    /// number then counts channels, not pixels.
-    fn has_channels_as_side(&self, sides: [usize; 2], input: [&Dim; 2]) -> bool {
+    /// True if one of the two axes is a channel axis, not a side of the image: its size is fixed and small, but the other axis and both
+    /// sides of the input are dynamic.
+    fn has_channels_as_side(&self, axes: [usize; 2], input: [&Dim; 2]) -> bool {
         let is_input_dynamic = input.iter().all(|side| side.known().is_none());
-        let has_small_side = match sides.map(|side| self.dims[side].known()) {
+        let has_small_side = match axes.map(|axis| self.dims[axis].known()) {
             [Some(size), None] | [None, Some(size)] => size <= MAX_CHANNELS,
             _ => false,
         };
         is_input_dynamic && has_small_side
     }
 
-    /// Fixed sizes of the dimensions that can be channels.
+    /// Possible channel counts: the fixed, small sizes at the channel axes of all layouts of this rank.
     pub(crate) fn channel_counts(&self) -> Vec<usize> {
         TensorLayout::ALL
             .into_iter()
@@ -123,37 +125,38 @@ impl Port {
             .collect()
     }
 
-    /// Number of channels that the graph declares for an image; `None` if it declares none.
+    /// Declared number of channels of an image: 3 if a layout has three channels, else the size of the third axis from the end (CHW);
+    /// `None` if that size is dynamic.
     pub(crate) fn channels(&self) -> Option<usize> {
-        let three = self.layout(3).map(|_| 3);
-        let first = self.dims.len().checked_sub(3);
-        three.or_else(|| self.dims.get(first?).and_then(Dim::known))
+        let rgb = self.layout(3).map(|_| 3);
+        let chw_axis = self.dims.len().checked_sub(3);
+        rgb.or_else(|| self.dims.get(chw_axis?).and_then(Dim::known))
     }
 
-    /// True if an exporter generated the name: a number, a path of modules, or an operator's name.
+    /// True if an exporter generated the name: a number, a module path or an operator's name.
     ///
-    /// An exporter that gets fewer names than outputs names the first outputs and numbers the rest. A first output named `output` is then
-    /// not necessarily the image (for Zero-DCE it is not).
+    /// If the user passes fewer names than the graph has outputs, the exporter applies them to the first outputs and generates the rest.
+    /// The output that got the name `output` is then not necessarily the image: in Zero-DCE it is another one.
     pub(crate) fn is_numbered(&self) -> bool {
         const OPERATORS: [&str; 19] = [
             "add", "cat", "clamp", "clip", "concat", "conv", "conv2d", "div", "getitem",
             "identity", "max", "min", "mul", "pow", "relu", "sigmoid", "slice", "sub", "tanh",
         ];
         let name = &self.name;
-        let word = name
+        let stem = name
             .trim_end_matches(|c: char| c.is_ascii_digit() || c == '_')
             .to_ascii_lowercase();
-        word.is_empty() || name.contains(['/', ':', '.']) || OPERATORS.contains(&word.as_str())
+        stem.is_empty() || name.contains(['/', ':', '.']) || OPERATORS.contains(&stem.as_str())
     }
 
-    /// True if the port is a single number: all dimensions are 1, except that one may be dynamic, such as the batch.
+    /// True if the port is a single number: all dimensions are 1. One of them may be dynamic instead, such as the batch size.
     pub(crate) fn is_scalar(&self) -> bool {
         let dynamic = self.dims.iter().filter(|dim| dim.known().is_none()).count();
         dynamic <= 1 && self.dims.iter().all(|dim| dim.can_be(1))
     }
 }
 
-/// Ports as text, for messages.
+/// Ports as a comma-separated list for messages; `none` without ports.
 pub(crate) fn format_ports(ports: &[Port]) -> String {
     if ports.is_empty() {
         return "none".to_owned();

@@ -1,27 +1,28 @@
-//! Kinds of pooled findings: the compared sides and the counted replies, [`PooledKind`].
+//! Kinds of comparisons for pooled findings: [`PooledKind`].
 
 use crate::answers::confusion::FalseAnswer;
 use crate::grid::GridItem;
 use darkqa_ground::types::Family;
 use darkqa_ground::types::degradations::Kind;
 
-/// The two sides of a pooled finding. Right replies are counted unless a variant defines others.
+/// Comparison that a pooled finding reports: its two sides, and the replies that it counts. Correct replies are counted, except in
+/// [`Self::Hallucination`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum PooledKind {
     /// A degraded level against L0, without an enhancer.
     Darkness,
-    /// Sensor noise against exposure drop alone, at the same level.
+    /// Exposure drop with sensor noise against exposure drop alone, at the same level.
     Noise,
-    /// Enhanced against raw, at the same level and variant.
+    /// Enhanced images against raw ones, at the same level and variant.
     Enhancer,
     /// Raw images against no image.
     Blind,
-    /// A degraded level against L0, without an enhancer: false answers to presence questions.
+    /// False answers to presence questions: a degraded level against L0, without an enhancer.
     Hallucination(FalseAnswer),
 }
 
 impl PooledKind {
-    /// Kinds for raw images of a kind of degradation; `None` is L0.
+    /// Comparisons that apply to raw images with this degradation; `None` is L0. [`Self::Noise`] needs a degradation that extends another.
     pub(super) fn for_raw(degradation: Option<Kind>) -> Vec<Self> {
         let Some(degradation) = degradation else {
             return vec![Self::Blind];
@@ -36,7 +37,7 @@ impl PooledKind {
         others.into_iter().chain(noise).collect()
     }
 
-    /// Name of the kind in CSV files.
+    /// Name of the comparison in CSV files.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -49,7 +50,8 @@ impl PooledKind {
         }
     }
 
-    /// Name of the kind for images of a kind of degradation; for [`Self::Darkness`], the cause of the loss there.
+    /// Name of the comparison on images with this degradation. [`Self::Darkness`] is named after the cause of the loss, which depends on
+    /// the degradation.
     #[must_use]
     pub fn name_on(self, degradation: Option<Kind>) -> &'static str {
         match (self, degradation) {
@@ -58,7 +60,7 @@ impl PooledKind {
         }
     }
 
-    /// The only family that findings of this kind are about; `None` if they are about each family and all together.
+    /// Question family to which the comparison is restricted; `None` if it applies to each family and to all of them together.
     #[must_use]
     pub fn only_family(self) -> Option<&'static Family> {
         match self {
@@ -67,8 +69,10 @@ impl PooledKind {
         }
     }
 
-    /// True if the effect is assumed to grow with the level, so that the darkest level is tested first: loss in the dark, accuracy below
-    /// the blind baseline, missed objects. The effects of noise and enhancers and false objects may be largest at any level.
+    /// True if the effect is assumed to grow with the level, so that the darkest level is tested first.
+    ///
+    /// Loss in the dark, loss against the blind baseline and missed objects grow with the level. Noise, enhancers and invented objects may
+    /// have their largest effect at any level.
     pub(crate) fn grows_with_the_level(self) -> bool {
         matches!(
             self,
@@ -76,12 +80,12 @@ impl PooledKind {
         )
     }
 
-    /// True if levels are also tested together: for the costs of darkness and noise, and the effect of enhancers.
+    /// True if the average over the levels is tested, too, in addition to each level.
     pub(super) fn is_averaged(self) -> bool {
         matches!(self, Self::Darkness | Self::Noise | Self::Enhancer)
     }
 
-    /// True if findings of this kind include an item.
+    /// True if the comparison includes an item.
     pub(super) fn is_about(self, item: &GridItem<'_>) -> bool {
         match self {
             Self::Hallucination(answer) => answer.is_false_for(item),
@@ -89,7 +93,7 @@ impl PooledKind {
         }
     }
 
-    /// True if a parsed reply to an item is counted.
+    /// True if a parsed reply to an item is counted: for [`Self::Hallucination`] a false answer, else a correct reply.
     pub(super) fn counts(self, item: &GridItem<'_>, chosen: Option<u8>) -> bool {
         match self {
             Self::Hallucination(answer) => answer.is_given(item, chosen),
@@ -97,7 +101,8 @@ impl PooledKind {
         }
     }
 
-    /// Gain of the first side over the second, given the difference of their counted replies.
+    /// Gain of the first side over the second, given the difference of their counted replies. More false answers are a loss: the sign
+    /// is reversed for [`Self::Hallucination`].
     pub(super) fn gain(self, difference: f64) -> f64 {
         match self {
             Self::Hallucination(_) => -difference,

@@ -18,11 +18,11 @@ pub enum Status {
     Started,
     /// Every trial has a reply.
     Complete,
-    /// Every trial was tried, some failed.
+    /// Every trial was tried, but some failed.
     Incomplete,
     /// Interrupted by the user.
     Cancelled,
-    /// Stopped because the next question could have gone beyond `--max-cost`.
+    /// Stopped because the next question could have exceeded `--max-cost`.
     OverBudget,
     /// Stopped by an error that would fail every further trial.
     Stopped,
@@ -37,10 +37,10 @@ impl fmt::Display for Status {
     }
 }
 
-/// Numbers of a run's trials: all, with a reply, and failed.
+/// Trial counts of a run: all trials, answered and failed ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Counts {
-    /// The number of all trials.
+    /// The number of all trials, tried or not.
     pub trials: usize,
     /// The number of trials with a reply.
     pub answered: usize,
@@ -49,31 +49,32 @@ pub struct Counts {
 }
 
 impl Counts {
-    /// Counts the trials; `failed` has one entry for each stored trial, true if it failed.
+    /// Counts the outcomes of the stored trials. `trials` is the number of planned trials; `failed` has an entry for each stored trial,
+    /// true if the trial failed.
     #[must_use]
     pub fn new(trials: usize, failed: impl IntoIterator<Item = bool>) -> Self {
-        let (mut all, mut failures) = (0, 0);
+        let (mut stored, mut failures) = (0, 0);
         for has_failed in failed {
-            all += 1;
+            stored += 1;
             failures += usize::from(has_failed);
         }
         Self {
             trials,
-            answered: all - failures,
+            answered: stored - failures,
             failed: failures,
         }
     }
 }
 
-/// The fields in which two identities differ, with both values as text; a missing value is `unset`.
+/// The fields that differ between two maps of settings, with both values as text; a missing value is `unset`.
 pub fn differences<'a>(
     one: &'a BTreeMap<String, Value>,
     other: &'a BTreeMap<String, Value>,
 ) -> impl Iterator<Item = (&'a str, String, String)> {
     let fields: BTreeSet<&String> = one.keys().chain(other.keys()).collect();
     fields.into_iter().filter_map(move |field| {
-        let [first, second] = [one, other].map(|identity| {
-            identity
+        let [first, second] = [one, other].map(|settings| {
+            settings
                 .get(field)
                 .map_or("unset".to_owned(), ToString::to_string)
         });
@@ -81,31 +82,31 @@ pub fn differences<'a>(
     })
 }
 
-/// The column with the settings of each judge of open answers.
+/// The name of the column that defines the judges of open-ended answers.
 pub const JUDGES: &str = "judge";
 
-/// The judge's form of a model flag: `--judge-temperature` for `--temperature`.
+/// The judge's variant of a model flag, such as `--judge-temperature` for `--temperature`.
 pub fn judge_flag(flag: &str) -> String {
     flag.replacen("--", "--judge-", 1)
 }
 
-/// A column value with different meanings in two runs: the field that differs, and its content in each run.
+/// A difference between the definitions of one column value in two runs, such as two addresses of the same model.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ColumnDifference<'a> {
-    /// The column, as `model`.
+    /// The column, such as `model`.
     pub column: &'a str,
-    /// The value, as `gpt-4o`.
+    /// The value, such as `gpt-4o`.
     pub value: &'a str,
-    /// The flag that differs, as `--base-url`.
+    /// The field of the definition that differs; usually a flag, such as `--base-url`.
     pub field: String,
-    /// The flag's value in the first run, or `unset`.
+    /// The field's content in the first run, or `unset`.
     pub first: String,
-    /// The flag's value in the second run, or `unset`.
+    /// The field's content in the second run, or `unset`.
     pub second: String,
 }
 
 impl RunManifest {
-    /// Sets the counts, and the status that follows from them: complete if all trials have a reply.
+    /// Sets the counts and the resulting status: complete if all trials have a reply, else incomplete.
     pub fn set_counts(&mut self, counts: Counts) {
         self.counts = counts;
         self.status = if counts.answered == counts.trials {
@@ -115,17 +116,16 @@ impl RunManifest {
         };
     }
 
-    /// True if a model is built into this program and not asked through an endpoint.
+    /// True if a model is built into this program; false if it runs at an endpoint or is unknown to the run.
     #[must_use]
     pub fn is_built_in(&self, model: &str) -> bool {
-        let content = self
-            .columns
+        self.columns
             .get("model")
-            .and_then(|models| models.get(model));
-        content.is_some_and(|content| content.get("local").is_some())
+            .and_then(|models| models.get(model))
+            .is_some_and(|definition| definition.get("local").is_some())
     }
 
-    /// The column values that both runs have with different meanings.
+    /// The differences between the definitions of the column values that both runs have.
     #[must_use]
     pub fn column_differences<'a>(&'a self, other: &'a Self) -> Vec<ColumnDifference<'a>> {
         let mut found = Vec::new();
@@ -154,7 +154,7 @@ impl RunManifest {
     }
 }
 
-/// The fields of an object that are not null.
+/// The fields of a JSON object, without null values.
 fn fields(object: &Value) -> BTreeMap<String, Value> {
     object
         .as_object()
@@ -165,34 +165,35 @@ fn fields(object: &Value) -> BTreeMap<String, Value> {
         .collect()
 }
 
-/// The range of a shard's sources (frames or walks) among all sources of the run, in the order of their first questions.
+/// The range of sources (frames or walks) that a shard evaluates. The sources of the run are numbered in the order of their first
+/// questions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PartPlace {
-    /// Index of the first source, from 0.
+    /// Index of the shard's first source, from 0.
     pub first: usize,
-    /// Number of sources of the shard.
+    /// Number of sources in the shard.
     pub count: usize,
-    /// Number of sources of the whole run.
+    /// Number of sources in the whole run.
     pub of: usize,
 }
 
-/// The trials of one shard of a run.
+/// The sources of a shard, and their numbers of trials.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RunPart {
     /// The range of the shard's sources.
     #[serde(flatten)]
     pub place: PartPlace,
-    /// Number of trials about each source.
+    /// Number of trials for each source of the shard.
     pub trials: Vec<usize>,
 }
 
-/// The version of the lenient parsing in runs whose manifest does not state one.
+/// The version of the lenient reply parser in runs whose manifest does not record one: they predate that field.
 pub const FIRST_REPLY_READING: &str = "lenient/1";
 
-/// The settings that all trials of a run share and that are not a column of its tables, by flag.
+/// The settings that apply to all trials of a run, by flag. Settings that vary within a run are in [`Columns`].
 pub type Identity = BTreeMap<String, Value>;
 
-/// The definition of each value in a column of the tables, by column and value.
+/// The definitions of the values in the result tables, by column (such as `model`) and value (such as `gpt-4o`).
 pub type Columns = BTreeMap<String, BTreeMap<String, Value>>;
 
 /// The content of `manifest.json`.
@@ -210,36 +211,36 @@ pub struct RunManifest {
     pub updated: String,
     /// The platform, and the versions of the libraries that process pixels.
     pub platform: BTreeMap<String, String>,
-    /// The settings that all trials share and that are not a column, by flag. A run can only be resumed with the same identity.
+    /// The settings that apply to all trials, by flag. A run can only be resumed with the same identity.
     pub identity: Identity,
-    /// The meaning of each value in a column of the tables, by column and value: models, enhancers, noise profiles. A run may
-    /// get further values; the meaning of an existing value never changes.
+    /// The definitions of models, enhancers and noise profiles, by column and value. A resumed run may add values, but not redefine one.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub columns: Columns,
     /// The models in the order of the models file; empty without a file.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub models: Vec<ListedModel>,
-    /// How each enhancer was used, by its name; empty in runs of earlier versions.
+    /// The use of each enhancer, by its name; empty in runs of earlier versions.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub enhancers: BTreeMap<String, EnhancerNote>,
-    /// Changes made to the images when their files were read; `None` if there were none.
+    /// The changes made to the images when their files were read; `None` without changes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub inputs: Option<InputSummary>,
-    /// The shard of an evaluation, as `2/4`; `None` for the whole evaluation.
+    /// The shard of an evaluation, such as `2/4`; `None` for the whole evaluation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shard: Option<String>,
-    /// The trials of the shard; `None` for the whole evaluation.
+    /// The sources and trial counts of the shard; `None` for the whole evaluation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub part: Option<RunPart>,
-    /// The settings without an effect on replies: concurrency, timeouts.
+    /// The settings that do not affect replies, such as concurrency and timeouts.
     pub settings: BTreeMap<String, Value>,
-    /// The flags that decide the images, as the user wrote them; empty in runs of earlier versions.
+    /// The flags that determine the images, as the user wrote them; empty in runs of earlier versions.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub images: BTreeMap<String, Value>,
-    /// The version of the lenient parsing in the records, as `lenient/4`; `None` in runs of open questions, and in runs of earlier versions
-    /// of this program, which used [`FIRST_REPLY_READING`].
+    /// The version of the lenient reply parser that produced the records, such as `lenient/4`.
+    ///
+    /// `None` in runs of open-ended questions, and in runs of earlier versions of this program, which used [`FIRST_REPLY_READING`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reply_reading: Option<String>,
-    /// The number of trials, answered and failed.
+    /// The trial counts.
     pub counts: Counts,
 }
