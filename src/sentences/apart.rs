@@ -89,7 +89,7 @@ impl SameQuestionAccuracy {
         let subject = find(name)?;
         let cell = findings
             .summary
-            .cell(&grid.subjects[subject], None, ReadingMode::Strict)?;
+            .cell(&grid.subjects[subject], None, ParsingMode::Strict)?;
         let answered: Vec<usize> = (0..grid.items.len())
             .filter(|item| grid.result(subject, *item).is_reply())
             .collect();

@@ -429,8 +429,7 @@ impl Scores {
         let chance = self.items.iter().map(|item| item.guess).sum::<f64>() / n as f64;
         let loss = (clean.low > chance).then(|| {
             self.test(dark.len(), |item| {
-                item.right(model, &dark)
-                    - item.right(model, &(0..1)) * dark.len() as i64
+                item.right(model, &dark) - item.right(model, &(0..1)) * dark.len() as i64
             })
             .difference
         });
