@@ -123,12 +123,26 @@ pub(super) fn command(manifest: &RunManifest, run: &AnyRun) -> String {
             words.extend([flag.to_owned(), word(value)]);
         }
     }
-    match (&file, judge.and_then(|judge| remote.get(&judge.to_owned()))) {
-        (None, _) => words.extend(common_flags(&remote)),
-        (Some(_), Some(judge)) => {
-            words.extend(flag_words(&judge_flag("--base-url"), &judge["--base-url"]));
-        }
-        (Some(_), None) => {}
+    let tested: Vec<&Value> = remote
+        .iter()
+        .filter(|(name, _)| Some(name.as_str()) != judge || asked.seeing.contains(**name))
+        .map(|(_, content)| *content)
+        .collect();
+    if file.is_none() {
+        words.extend(common_flags(&tested));
+    }
+    // Without a models file, the judge's default address is that of the models.
+    if let Some(content) = judge.and_then(|judge| remote.get(&judge.to_owned()))
+        && (file.is_some()
+            || tested
+                .iter()
+                .any(|tested| tested["--base-url"] != content["--base-url"])
+            || tested.is_empty())
+    {
+        words.extend(flag_words(
+            &judge_flag("--base-url"),
+            &content["--base-url"],
+        ));
     }
     for (flag, value) in &manifest.images {
         words.extend(flag_words(&format!("--{flag}"), value));
@@ -232,8 +246,7 @@ fn is_control(model: &str) -> bool {
 }
 
 /// Shell words for the flags that have the same value for all models.
-fn common_flags(remote: &BTreeMap<&String, &Value>) -> Vec<String> {
-    let models: Vec<&Value> = remote.values().copied().collect();
+fn common_flags(models: &[&Value]) -> Vec<String> {
     let Some(first) = models.first().and_then(|first| first.as_object()) else {
         return Vec::new();
     };

@@ -195,6 +195,15 @@ fn judge_keeps_address_without_file() {
     for part in ["--model m", "--judge j", &format!("--base-url {base}")] {
         assert!(plain.contains(part), "{part}: {plain}");
     }
+    let elsewhere = MockEndpoint::start([Answer::text("5")]);
+    let address = format!("--judge-base-url {}", elsewhere.base_url());
+    house.call(&words(&format!(
+        "--model m {line} {address} --out elsewhere"
+    )));
+    let two_addresses = readme("elsewhere");
+    for part in [&format!("--base-url {base}"), &address] {
+        assert!(two_addresses.contains(part), "{part}: {two_addresses}");
+    }
     let table = format!("[[model]]\nname = \"One\"\nid = \"m\"\nendpoints = [\"{base}\"]\n");
     house.0.file("models.toml", table);
     house.call(&words(&format!("--models models.toml {line} --out named")));
