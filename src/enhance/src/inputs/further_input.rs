@@ -124,8 +124,12 @@ impl FurtherInput {
                 "its dimension of {other} is neither channels, height nor width"
             ));
         }
+        let takes_list = vector_length(&self.port).is_some_and(|length| length > 1);
         match (&self.value, self.axes) {
-            (ExtraValue::Number(number), None) | (ExtraValue::Map(number), Some(_)) => {
+            (ExtraValue::Number(number), None) if !takes_list => {
+                TensorData::repeated(&self.port.element, *number, 1).map(drop)
+            }
+            (ExtraValue::Map(number), Some(_)) => {
                 TensorData::repeated(&self.port.element, *number, 1).map(drop)
             }
             (ExtraValue::List(numbers), None) => {
@@ -138,7 +142,7 @@ impl FurtherInput {
                 }
                 TensorData::from_numbers(&self.port.element, numbers).map(drop)
             }
-            (_, None) if vector_length(&self.port).is_some_and(|length| length > 1) => {
+            (_, None) if takes_list => {
                 let length = vector_length(&self.port).unwrap_or(1);
                 Err(format!(
                     "it takes a list of {length} numbers: {}",

@@ -102,6 +102,16 @@ fn unsuitable_number_names_its_type() {
 }
 
 #[test]
+fn single_number_does_not_fill_vector() {
+    let graph = onnx::times_input(Type::Float, &[Size::Known(1), Size::Known(3)]);
+    let message = fault_of(&graph, "[extra]\nfactor = 0.5");
+    assert!(
+        message.contains("it takes a list of 3 numbers: `factor = ["),
+        "{message}"
+    );
+}
+
+#[test]
 fn map_and_expression_have_images_size() {
     let image = image(12, 20);
     let graph = onnx::times_plane("factor");
