@@ -112,7 +112,7 @@ pub(crate) struct OutputArgs {
     /// Run folder; default: results/TIME-MODEL-DATA-HASH, which the same command finds again
     #[arg(long, value_name = "DIR", conflicts_with = "resume", add = Decides::Nothing)]
     pub out: Option<PathBuf>,
-    /// Continue the run in this folder, with the flags of the run; default: none
+    /// Continue the run in this folder: repeat its flags, with added values to extend it (--profile paper,physical); default: none
     #[arg(long, value_name = "DIR", add = Decides::Nothing)]
     pub resume: Option<PathBuf>,
     /// Create run and --images-cache folders with the permissions of the umask; default: readable by you only, because they hold replies
