@@ -1,4 +1,4 @@
-//! Image folders named by class, as a classification question about each image: [`open`].
+//! Classification data sets with one folder of images per class: [`open`].
 
 use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
@@ -10,12 +10,13 @@ use crate::error::{Error, Result};
 use crate::files::reading::{self, entries};
 use crate::types::{Choices, Digest, Family, FrameId, Question, QuestionId};
 
-/// Opens a folder with a subfolder for each class, and asks `question` about each image. Frames and questions are named `CLASS/FILE`.
-/// The choices are all class names in alphabetical order, or `choices` of them: the true one and others drawn by the content of the
-/// image.
+/// Opens a folder with one subfolder per class, and asks `question` about each image. Frames and questions are named `CLASS/FILE`.
+///
+/// Without `choices`, a question offers all class names in alphabetical order. With `choices`, it offers that number of names: the true
+/// class and others drawn by a digest of the image file.
 ///
 /// # Errors
-/// If there are fewer than two classes or too many for the choices, or an image cannot be read.
+/// If the folder has fewer than two classes, the number of choices is invalid ([`choice_count`]), or a file cannot be read.
 pub(super) fn open(
     folder: &Path,
     question: &str,
@@ -58,7 +59,10 @@ pub(super) fn open(
     Ok(Dataset::new(super::stem(folder), sources, questions))
 }
 
-/// Images of each class folder, by its name. Warns about folders without images and about images in unsupported formats.
+/// Image files of each class, by class name. Warns about folders without images and about images in unsupported formats.
+///
+/// # Errors
+/// If a folder cannot be read, or fewer than two have images.
 fn classes(folder: &Path) -> Result<BTreeMap<String, Vec<PathBuf>>> {
     let mut classes = BTreeMap::new();
     for inner in entries(folder)?.into_iter().filter(|path| path.is_dir()) {
@@ -91,7 +95,8 @@ fn classes(folder: &Path) -> Result<BTreeMap<String, Vec<PathBuf>>> {
 /// Number of choices of each question.
 ///
 /// # Errors
-/// If `choices` is not from 2 to the number of classes, or is not given for too many classes.
+/// If `choices` is below 2, or above the number of classes or [`Choices::MOST`]. Without `choices`, if there are more than
+/// [`Choices::MOST`] classes.
 fn choice_count(folder: &Path, classes: usize, choices: Option<NonZeroUsize>) -> Result<usize> {
     match choices.map(usize::from) {
         None if classes > Choices::MOST => Err(Error::usage(
@@ -118,9 +123,14 @@ fn choice_count(folder: &Path, classes: usize, choices: Option<NonZeroUsize>) ->
     }
 }
 
-/// The true class of an image and the others with the lowest digest of the image and their name, in the order of `names`.
-fn draw_choices<'n>(names: &[&'n str], own: &str, count: usize, image: &Digest) -> Vec<&'n str> {
-    let mut others: Vec<&str> = names.iter().copied().filter(|name| *name != own).collect();
+/// Draws the class names to offer for an image: the true class, and the other classes with the smallest digests of image and name. They
+/// keep the order of `names`.
+fn draw_choices<'n>(names: &[&'n str], truth: &str, count: usize, image: &Digest) -> Vec<&'n str> {
+    let mut others: Vec<&str> = names
+        .iter()
+        .copied()
+        .filter(|name| *name != truth)
+        .collect();
     others.sort_by_cached_key(|name| {
         *Digest::from_parts([&b"darkqa.label/1"[..], image.as_bytes(), name.as_bytes()]).as_bytes()
     });
@@ -128,7 +138,7 @@ fn draw_choices<'n>(names: &[&'n str], own: &str, count: usize, image: &Digest) 
     names
         .iter()
         .copied()
-        .filter(|name| *name == own || others.contains(name))
+        .filter(|name| *name == truth || others.contains(name))
         .collect()
 }
 
@@ -143,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn drawn_choices_depend_on_content_and_include_truth() {
+    fn drawn_choices_include_the_truth() {
         let mut seen = std::collections::BTreeSet::new();
         for content in 0..40_u8 {
             let names = draw(&[content]);
@@ -160,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn wrong_numbers_of_choices_are_errors() {
+    fn choice_count_checks_its_range() {
         assert_eq!(count(12, 0), Ok(12));
         assert_eq!(count(30, 4), Ok(4));
         for (classes, choices, part) in [

@@ -1,9 +1,13 @@
-//! Renders of habitat-sim: one folder per scene, with instance names from the original data set.
+//! Import of habitat-sim renders: one folder per scene, with instance names from the original data set.
 //!
-//! A scene has `<scene>/rgb/<frame>.png`, `depth/<frame>.npy` (metres) or `.png`, and `semantic/<frame>.npy` or 16-bit `.png`
-//! (instance numbers), and `*.semantic.txt` (HM3D-Sem), `*.house` (Matterport3D) or `info_semantic.json` (Replica). The optional
-//! `trajectory.jsonl` has one line per frame: `{"frame", "t", "pose", "intrinsics"}`. The optional `scenes.json` in the folder of
-//! the scenes records how they were rendered (see [`renders`]).
+//! The folder of a scene has these files:
+//! - `rgb/<frame>.png`;
+//! - `depth/<frame>.npy` (metres) or `.png`, optional;
+//! - `semantic/<frame>.npy` or 16-bit `.png` (instance numbers);
+//! - one annotation file: `*.semantic.txt` (HM3D-Sem), `*.house` (Matterport3D) or `info_semantic.json` (Replica);
+//! - `trajectory.jsonl`, optional, with one line per frame: `{"frame", "t", "pose", "intrinsics"}`.
+//!
+//! The optional `scenes.json`, next to the scene folders, records how the scenes were rendered (see [`renders`]).
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -19,20 +23,20 @@ use crate::error::{Error, Result};
 use crate::files::reading::{json_lines, text};
 use crate::types::{Intrinsics, Rgb, SegmentName};
 
-/// Minimum share of the named pixels, in percent, that a region needs to determine the room type of the frame (chosen).
+/// Minimum share of a frame's named pixels, in percent, in the region that gives the frame its room type (chosen).
 const MIN_REGION_PERCENT: u64 = 60;
 
 /// Folder of rendered scenes.
 #[derive(Debug)]
 pub(super) struct Habitat {
     listing: Listing,
-    /// Paths of the depth and semantic map of each frame.
+    /// Paths of the depth map (if any) and the semantic map of each frame.
     maps: Vec<(Option<PathBuf>, PathBuf)>,
     scenes: BTreeMap<String, SceneInfo>,
-    /// Number of each class.
-    numbers: BTreeMap<String, u16>,
+    /// Number of each class in the class maps, by canonical name.
+    class_numbers: BTreeMap<String, u16>,
     depth_scale: Option<f64>,
-    /// Files about scenes.
+    /// `scenes.json`, and the annotation file and trajectory of each scene.
     scene_files: Vec<PathBuf>,
 }
 
@@ -41,12 +45,13 @@ pub(super) struct Habitat {
 struct SceneInfo {
     /// Room type of each region.
     rooms: BTreeMap<i64, &'static str>,
-    /// Offset from instance numbers to segment numbers: 1 if an instance has the number 0, which means no segment here; else 0.
+    /// Difference of segment numbers from instance numbers. It is 1 if an instance has the number 0, because segment 0 means no segment;
+    /// else 0.
     offset: u32,
 }
 
-/// Names of the instances of a scene, by number.
-type InstanceNames = BTreeMap<u32, SegmentName>;
+/// Names of the segments of a scene, by segment number.
+type SegmentNames = BTreeMap<u32, SegmentName>;
 
 /// Line of `trajectory.jsonl`.
 #[derive(Deserialize)]
@@ -64,7 +69,7 @@ impl Habitat {
             ..Listing::with_mpcat40(args)
         };
         let mut set = Self {
-            numbers: class_numbers(&listing.labels),
+            class_numbers: class_numbers(&listing.labels),
             listing,
             maps: Vec::new(),
             scenes: BTreeMap::new(),
@@ -113,8 +118,8 @@ impl Habitat {
         Ok(())
     }
 
-    /// Reads the annotation file of a scene: its room types, and the names of its segments.
-    fn read_annotations(&mut self, folder: &Path) -> Result<(SceneInfo, InstanceNames)> {
+    /// Reads the room types and the segment names from the annotation file of a scene.
+    fn read_annotations(&mut self, folder: &Path) -> Result<(SceneInfo, SegmentNames)> {
         let annotations = files(folder, &[".semantic.txt", ".house", "info_semantic.json"])?;
         let Some(path) = annotations.into_values().next() else {
             let problem = "none of *.semantic.txt (HM3D-Sem), *.house (Matterport3D), info_semantic.json (Replica) in this folder; one of them must name the instances of the semantic maps";
@@ -151,7 +156,7 @@ impl Habitat {
     }
 }
 
-/// Reads a trajectory, by frame; empty if the file does not exist.
+/// Reads the steps of a trajectory, by frame name; empty if the file does not exist.
 fn read_trajectory(path: &Path) -> Result<BTreeMap<String, TrajectoryStep>> {
     if !path.exists() {
         return Ok(BTreeMap::new());
@@ -181,26 +186,26 @@ impl Adapter for Habitat {
         let depth = read_frame_depth(depth_path.as_deref(), self.depth_scale, rgb)?;
         let mut segments = read_segments(semantic)?;
         check_same_size(semantic, &segments, rgb)?;
-        let (mut regions, mut named) = (BTreeMap::new(), 0_u64);
-        // Neighbouring pixels mostly have the same instance, so the last one is cached.
+        let (mut region_pixels, mut named_pixels) = (BTreeMap::new(), 0_u64);
+        // Neighbouring pixels mostly belong to the same instance, so the last lookup is cached.
         let (mut last_id, mut class, mut region) = (None, 0, None);
         let classes = segments.mapv(|id| {
             if last_id != Some(id) {
                 let name = id.checked_add(scene.offset).and_then(|id| names.get(&id));
                 last_id = Some(id);
                 class = name
-                    .and_then(|name| self.numbers.get(&name.canonical))
+                    .and_then(|name| self.class_numbers.get(&name.canonical))
                     .copied()
                     .unwrap_or(0);
                 region = name.and_then(|name| name.region);
             }
             if class != 0 {
-                named += 1;
-                *regions.entry(region).or_insert(0_u64) += 1;
+                named_pixels += 1;
+                *region_pixels.entry(region).or_insert(0_u64) += 1;
             }
             class
         });
-        if named == 0 {
+        if named_pixels == 0 {
             let problem = "no pixel has the number of an instance that the scene names; habitat-sim writes 0 everywhere if the scene is opened without its *.scene_dataset_config.json";
             return Err(Error::data(semantic.display(), problem));
         }
@@ -208,13 +213,13 @@ impl Adapter for Habitat {
             Some(id) if names.contains_key(&id) => id,
             _ => 0,
         });
-        let (region, pixels) = regions
+        let (region, pixels) = region_pixels
             .into_iter()
             .max_by_key(|(_, count)| *count)
             .unwrap_or((None, 0));
         let room = region
             .and_then(|region| scene.rooms.get(&region))
-            .filter(|_| pixels * 100 >= named * MIN_REGION_PERCENT);
+            .filter(|_| pixels * 100 >= named_pixels * MIN_REGION_PERCENT);
         Ok(FrameMaps {
             depth,
             semantic: Some(classes),

@@ -6,12 +6,12 @@ use crate::text::alert::{Alert, AlertKind};
 use crate::text::table::Table;
 use darkqa_score::findings::Findings;
 
-/// Findings of one or more runs, as sentences and as tables. The terminal output, the page and all files are made from it.
+/// Findings of one or more runs as sentences and tables, for the terminal, the page and the files of a report.
 #[derive(Debug)]
 pub struct ChoiceReport<'a> {
-    /// Findings without a hidden observer.
+    /// Findings to show; a hidden observer is left out.
     pub findings: &'a Findings<'a>,
-    /// Warnings at the top of the report.
+    /// Warnings and notes at the top of the report.
     pub alerts: Vec<Alert>,
     /// Findings as sentences.
     pub(crate) sentences: Vec<Sentence>,
@@ -20,7 +20,7 @@ pub struct ChoiceReport<'a> {
 }
 
 impl<'a> ChoiceReport<'a> {
-    /// Writes the sentences and the tables of a report.
+    /// Creates the report of `findings`. Notes about the observer follow `alerts`.
     #[must_use]
     pub fn new(findings: &'a Findings<'a>, alerts: Vec<Alert>) -> Self {
         let shown = findings.shown();
@@ -35,7 +35,7 @@ impl<'a> ChoiceReport<'a> {
         }
     }
 
-    /// Adds the table of how each enhancer was used.
+    /// Adds the table of enhancer use.
     pub(crate) fn with_enhancers(mut self, rows: &[EnhancerRow]) -> Self {
         self.tables.extend(enhancers(rows));
         self

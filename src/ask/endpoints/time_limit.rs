@@ -1,6 +1,6 @@
-//! Time limit that counts only the time in which the process runs: [`TimeLimit`].
+//! Time limit that excludes suspensions of the process: [`TimeLimit`].
 //!
-//! A suspended process (Ctrl-Z, `scontrol suspend`, a closed laptop) reads nothing, but the clock goes on. Replies that arrive during
+//! A suspended process (Ctrl-Z, `scontrol suspend`, a closed laptop) reads nothing, but the clock runs on. Replies that arrive during
 //! the suspension are paid for, so they must be read before a timeout is declared.
 
 use std::pin::pin;
@@ -8,19 +8,21 @@ use std::time::Duration;
 
 use tokio::time::{Instant, timeout};
 
-/// Number of steps into which a limit is divided, and the shortest and longest step; chosen. A suspension counts as one step.
+/// Number of steps into which a limit is divided (chosen). A suspension uses up at most one step of the limit.
 const STEPS: u32 = 20;
+/// Shortest step (chosen).
 const MIN_STEP: Duration = Duration::from_millis(10);
+/// Longest step (chosen).
 const MAX_STEP: Duration = Duration::from_secs(1);
 
-/// Minimum delay of a step that counts as a suspension; chosen: a busy machine delays a timer less.
+/// Minimum timer delay of a suspension (chosen): a busy machine delays a timer less. The delay must also exceed one step.
 const MIN_SUSPENSION: Duration = Duration::from_millis(100);
 
-/// Limit on the time in which the process runs, for one future or several consecutive ones.
+/// Limit on the running time of one future, or of several futures one after another. Suspensions of the process do not count.
 #[derive(Debug)]
 pub(super) struct TimeLimit {
     step: Duration,
-    /// Time left.
+    /// Running time left.
     left: Duration,
     /// Total time of the detected suspensions.
     suspended: Duration,
@@ -35,7 +37,7 @@ impl TimeLimit {
         }
     }
 
-    /// Runs a future; `None` if the limit is reached before it ends.
+    /// Runs a future; `None` if the limit is reached before the future is ready.
     pub(super) async fn run<T>(&mut self, future: impl Future<Output = T>) -> Option<T> {
         let mut future = pin!(future);
         loop {
@@ -65,7 +67,7 @@ impl TimeLimit {
     }
 }
 
-/// Sleeps until the process has run for a time; suspensions do not count.
+/// Sleeps for a running time; suspensions of the process do not count.
 pub(crate) async fn sleep_running(time: Duration) {
     let _ = TimeLimit::new(time).run(std::future::pending::<()>()).await;
 }
@@ -81,7 +83,7 @@ mod tests {
 
     const LIMIT: Duration = Duration::from_millis(400);
 
-    /// Simulated suspension of the process: its only thread sleeps.
+    /// Length of a simulated suspension: the only thread of the test runtime sleeps.
     const SUSPENSION: Duration = Duration::from_millis(900);
 
     #[tokio::test(start_paused = true)]
@@ -102,15 +104,18 @@ mod tests {
         assert_eq!(limit.suspended(), Duration::ZERO);
     }
 
-    /// Chunks of a reply that arrive one by one.
+    /// Each future represents one chunk of a streamed reply.
     #[tokio::test(start_paused = true)]
     async fn short_futures_do_not_outlast_the_limit() {
         let mut limit = TimeLimit::new(LIMIT);
         let interval = Duration::from_millis(5);
-        let mut read = 0;
+        let mut chunks = 0;
         while limit.run(sleep(interval)).await.is_some() {
-            read += 1;
-            assert!(read <= LIMIT.as_millis() / interval.as_millis(), "{read}");
+            chunks += 1;
+            assert!(
+                chunks <= LIMIT.as_millis() / interval.as_millis(),
+                "{chunks}"
+            );
         }
         assert!(
             limit.run(async {}).await.is_some(),
@@ -135,13 +140,13 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn output_after_suspension_precedes_the_limit() {
-        // Suspension in the last step: the future is ready only some polls later, like a socket that another task reads.
+    async fn late_output_is_read_after_suspension() {
+        // The suspension is in the last step. The future is ready some polls later, like a socket that another task reads.
         let mut limit = TimeLimit::new(LIMIT);
         limit.left = MIN_STEP;
-        let stop = tokio::spawn(async { thread::sleep(SUSPENSION) });
+        let suspension = tokio::spawn(async { thread::sleep(SUSPENSION) });
         let ready = async {
-            stop.await.unwrap();
+            suspension.await.unwrap();
             for _ in 0..5 {
                 tokio::task::yield_now().await;
             }

@@ -1,26 +1,27 @@
-//! Chunk of an MCAP file, decompressed while it is read: [`Chunk`].
+//! Streaming decompression of a chunk of an MCAP file: [`Chunk`].
 
 use std::io::{self, BufReader, Read, Seek, Take};
 
 use lz4_flex::frame::FrameDecoder;
 use zstd::stream::read::Decoder;
 
-/// Maximum compression ratio of a chunk, beyond [`ALWAYS_ALLOWED`] (chosen). Repeated black raw images reach some thousands.
+/// Maximum compression ratio of a chunk, not counting the first [`ALWAYS_ALLOWED`] bytes (chosen). Repeated black raw images reach ratios
+/// of some thousands.
 const MAX_RATIO: u64 = 10_000;
 
-/// Number of content bytes that are allowed at any ratio (chosen).
+/// Decompressed size in bytes that is allowed at any compression ratio (chosen).
 const ALWAYS_ALLOWED: u64 = 64 << 20;
 
 /// Header of a chunk.
 #[derive(Debug)]
 pub(super) struct ChunkHeader {
-    /// First and last log time of its messages, in nanoseconds.
+    /// First and last log time of the chunk's messages, in nanoseconds.
     pub(super) times: [u64; 2],
     /// Length of the records after decompression, in bytes.
     pub(super) length: u64,
     /// CRC-32 of the records after decompression; 0 for none.
     pub(super) crc: u32,
-    /// Name of the compression; empty for none.
+    /// Name of the compression, `zstd` or `lz4`; empty for none.
     pub(super) compression: String,
     /// Length of the records in the file, in bytes.
     pub(super) stored_length: u64,
@@ -28,15 +29,17 @@ pub(super) struct ChunkHeader {
 
 /// An open chunk.
 pub(super) struct Chunk<R: Read> {
+    /// First and last log time of the chunk's messages, in nanoseconds.
     pub(super) times: [u64; 2],
     content: Content<R>,
-    /// Number of content bytes that are not read yet.
+    /// Number of decompressed bytes that are not read yet.
     pub(super) remaining: u64,
     hasher: crc32fast::Hasher,
     /// Expected CRC-32; 0 for none.
     crc: u32,
 }
 
+/// Records of a chunk, by compression.
 enum Content<R: Read> {
     Plain(Take<BufReader<R>>),
     Zstd(Decoder<'static, Take<BufReader<R>>>),
@@ -44,7 +47,10 @@ enum Content<R: Read> {
 }
 
 impl<R: Read> Chunk<R> {
-    /// Opens the chunk whose records begin at the position of `file`. The error returns the file.
+    /// Opens the chunk whose records begin at the position of `file`.
+    ///
+    /// # Errors
+    /// If the compression is unknown, its decoder cannot be created, or the ratio exceeds [`MAX_RATIO`]. The error contains `file`.
     pub(super) fn open(
         header: &ChunkHeader,
         file: BufReader<R>,
@@ -84,15 +90,15 @@ impl<R: Read> Chunk<R> {
 }
 
 impl<R: Read + Seek> Chunk<R> {
-    /// True if the CRC-32 of the content that was read is correct, or the chunk has none.
+    /// True if the chunk has no CRC-32, or the bytes read so far match it. Call it after all bytes are read.
     pub(super) fn is_intact(&self) -> bool {
         self.crc == 0 || self.crc == self.hasher.clone().finalize()
     }
 
-    /// Returns the file, at the end of the chunk's records.
+    /// Returns the file, positioned at the end of the chunk's records.
     ///
     /// # Errors
-    /// If the file cannot be read.
+    /// If the seek fails.
     pub(super) fn into_file(self) -> io::Result<BufReader<R>> {
         let stored = match self.content {
             Content::Plain(stored) => stored,

@@ -1,4 +1,4 @@
-//! Data of the page's script for any kind of question: [`PageData`], as compressed JSON in base64 ([`packed_by`]).
+//! Data that the report page embeds for its script: [`PageData`], as gzipped JSON in base64 ([`packed_by`]).
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::io::Write;
@@ -14,14 +14,14 @@ use crate::error::{Error, Result};
 use crate::types::questions::PixelBox;
 use crate::types::{Axis, AxisLevel, FrameId, ObjectCrop, Thumbnail};
 
-/// Result code of a reply that could not be parsed. Smaller codes are indices of choices.
+/// Result code of a reply that could not be parsed. Smaller codes are choice indices or marks of the judge ([`PageKind`]).
 pub(in crate::report) const UNREAD: u8 = 26;
 /// Result code of a failed trial.
 pub(in crate::report) const FAILED: u8 = 27;
-/// Result code of an item that was not asked.
+/// Result code of an item that the subject was not asked.
 pub(in crate::report) const ABSENT: u8 = 28;
 
-/// Maximum length of a reply on the page, in characters. The first value with which all replies fit is used.
+/// Maximum lengths of a reply on the page in characters, tried in order until all replies fit into [`SizeLimit::text`].
 const MAX_REPLY_CHARS: [usize; 5] = [20_000, 2_000, 400, 100, 30];
 /// Size limits, tried in order until the packed items fit into [`MAX_PACKED_BYTES`].
 const SIZE_LIMITS: [SizeLimit; 3] = [
@@ -41,27 +41,27 @@ const SIZE_LIMITS: [SizeLimit; 3] = [
 /// Maximum size of the packed items in bytes, so that the page stays under 12 MB.
 const MAX_PACKED_BYTES: usize = 10_500_000;
 
-/// Maximum sizes of the parts that can be shortened.
+/// Maximum sizes of the replies and the thumbnails on the page.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::report) struct SizeLimit {
-    /// Bytes of all different replies.
+    /// Total size of the distinct replies, in bytes.
     pub(in crate::report) text: usize,
-    /// Bytes of all thumbnails.
+    /// Total size of the thumbnails and object crops, in bytes.
     pub(in crate::report) pictures: usize,
 }
 
-/// Kind of questions.
+/// Kind of the report's questions.
 #[derive(Debug, Clone, Copy, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub(in crate::report) enum PageKind {
-    /// Questions with choices; a result is the index of the choice.
+    /// Multiple-choice questions; a result is the index of the chosen answer.
     Choice,
-    /// Open questions; a result is the mark of the judge from 1 to 5, or 0 for an empty answer.
+    /// Open questions; a result is the judge's mark from 1 to 5, or 0 for an empty answer.
     Open,
 }
 
-/// All data of the script. Objects refer to each other by their indices in these lists; nested lists have a row for each subject and a
-/// column for each item.
+/// All data of the page's script. Entries refer to each other by their indices in these lists. Nested lists have a row for each subject
+/// and a column for each item.
 #[derive(Serialize)]
 pub(in crate::report) struct PageData<'a> {
     pub(in crate::report) kind: PageKind,
@@ -74,7 +74,7 @@ pub(in crate::report) struct PageData<'a> {
     /// Recorded name and display name of each family.
     pub(in crate::report) families: Vec<[&'a str; 2]>,
     pub(in crate::report) frames: Vec<&'a str>,
-    /// Width and height of each frame in pixels, if its thumbnails state them.
+    /// Width and height of each frame in pixels; `None` if no thumbnail records them.
     pub(in crate::report) sizes: Vec<Option<[u32; 2]>>,
     pub(in crate::report) subjects: Vec<ModelInCondition<'a>>,
     pub(in crate::report) questions: Vec<Question<'a>>,
@@ -84,7 +84,7 @@ pub(in crate::report) struct PageData<'a> {
     pub(in crate::report) strict: Vec<Vec<u8>>,
     /// Result codes by lenient parsing; empty for open questions.
     pub(in crate::report) lenient: Vec<Vec<u8>>,
-    /// Reasons why replies were not parsed or did not come.
+    /// Distinct reasons for unparsed replies and failed trials.
     pub(in crate::report) reasons: Vec<String>,
     /// Index into `reasons` of each result.
     pub(in crate::report) why: Vec<Vec<usize>>,
@@ -95,22 +95,22 @@ pub(in crate::report) struct PageData<'a> {
     /// Index into `texts` of each judge's reply; empty without a judge.
     pub(in crate::report) judged: Vec<Vec<usize>>,
     pub(in crate::report) confusions: Vec<Confusion<'a>>,
-    /// Images by index of the frame and name of the condition.
+    /// Images by frame index and condition name.
     pub(in crate::report) thumbnails: BTreeMap<usize, BTreeMap<String, Picture<'a>>>,
 }
 
-/// A model in a condition.
+/// Subject of the report: a model in a condition.
 #[derive(Serialize)]
 pub(in crate::report) struct ModelInCondition<'a> {
     pub(in crate::report) name: String,
     pub(in crate::report) model: &'a str,
     pub(in crate::report) condition: String,
-    /// Text for variant and enhancer, or `blind`.
+    /// Display text of variant and enhancer; `blind` without images.
     pub(in crate::report) light: String,
     pub(in crate::report) level: Option<AxisLevel>,
     pub(in crate::report) variant: String,
     pub(in crate::report) enhancer: Option<&'a str>,
-    /// Index of the same model at L0 without an enhancer, if it was asked.
+    /// Index of the subject with the same model at L0 and no enhancer; `None` if it does not exist.
     pub(in crate::report) clean: Option<usize>,
 }
 
@@ -125,21 +125,22 @@ pub(in crate::report) struct Question<'a> {
     pub(in crate::report) outlines: Vec<PixelBox>,
     /// Bounding box of all objects in question together.
     pub(in crate::report) object: Option<PixelBox>,
-    /// Right answer to an open question.
+    /// Reference answer to an open question.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(in crate::report) answer: Option<&'a str>,
-    /// Further right answers to an open question.
+    /// Further accepted answers to an open question.
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
     pub(in crate::report) also_right: &'a [String],
 }
 
 #[derive(Serialize)]
 pub(in crate::report) struct Item {
-    /// Id of the question; from its second item on with a number, as in `id#2`.
+    /// Question id, with the item's number if it is not the question's first item, as in `id#2`.
     pub(in crate::report) name: String,
     pub(in crate::report) question: usize,
+    /// Index into the lists of choices.
     pub(in crate::report) choices: usize,
-    /// Index of the true choice; `None` if it is unknown.
+    /// Index of the true choice; `None` if the truth is unknown.
     pub(in crate::report) truth: Option<usize>,
 }
 
@@ -158,12 +159,12 @@ pub(in crate::report) struct Picture<'a> {
     pub(in crate::report) small: &'a str,
     /// Middle of the image, as a data URL.
     pub(in crate::report) crop: &'a str,
-    /// Gain of the crop in EV.
+    /// Gain applied to the crop, in EV.
     pub(in crate::report) stops: f32,
     pub(in crate::report) objects: &'a [ObjectCrop],
 }
 
-/// List of distinct entries, with the index of each.
+/// List of distinct entries, and the index of each entry.
 pub(in crate::report) struct Distinct<T> {
     pub(in crate::report) list: Vec<T>,
     pub(in crate::report) indices: HashMap<T, usize>,
@@ -177,7 +178,7 @@ impl<T: Copy + Eq + std::hash::Hash> Distinct<T> {
         }
     }
 
-    /// Index of an entry, which is added if it is new.
+    /// Returns the index of an entry; adds the entry if it is new.
     pub(in crate::report) fn index_of(&mut self, entry: T) -> usize {
         *self.indices.entry(entry).or_insert_with(|| {
             self.list.push(entry);
@@ -186,7 +187,8 @@ impl<T: Copy + Eq + std::hash::Hash> Distinct<T> {
     }
 }
 
-/// Packs data as base64, with the largest size limit that keeps it below [`MAX_PACKED_BYTES`]. `data` builds the data for a limit.
+/// Packs the data that `data` builds for a size limit. Tries [`SIZE_LIMITS`] in order until the packed data fit into
+/// [`MAX_PACKED_BYTES`]; the last limit is used even if they do not fit.
 ///
 /// # Errors
 /// If the data cannot be serialized.
@@ -201,6 +203,7 @@ pub(in crate::report) fn packed_by<'a>(data: impl Fn(SizeLimit) -> PageData<'a>)
     Ok(packed)
 }
 
+/// Compresses data and encodes them in base64.
 fn pack(data: &PageData<'_>) -> Result<String> {
     let compressed = compress(data).map_err(|e| Error::data("report.html", e))?;
     Ok(STANDARD.encode(compressed))
@@ -214,7 +217,7 @@ fn compress(data: &PageData<'_>) -> std::io::Result<Vec<u8>> {
     encoder.finish()
 }
 
-/// Shortens all texts to the first length of [`MAX_REPLY_CHARS`] with which they fit into `limit` bytes together.
+/// Cuts all texts to one maximum length: the first of [`MAX_REPLY_CHARS`] at which they fit together into `limit` bytes, else the last.
 pub(in crate::report) fn shortened(texts: &[&str], limit: usize) -> Vec<String> {
     let max_chars = MAX_REPLY_CHARS
         .into_iter()
@@ -235,19 +238,19 @@ pub(in crate::report) fn shortened(texts: &[&str], limit: usize) -> Vec<String> 
         .collect()
 }
 
-/// Size of each frame in pixels, if its thumbnails state it.
+/// Width and height of each frame in pixels; `None` if no thumbnail records them.
 pub(in crate::report) fn sizes(thumbnails: &[Thumbnail], frames: &[&str]) -> Vec<Option<[u32; 2]>> {
-    let stated: HashMap<&str, [u32; 2]> = thumbnails
+    let recorded: HashMap<&str, [u32; 2]> = thumbnails
         .iter()
         .filter_map(|thumbnail| Some((&*thumbnail.frame.0, thumbnail.size?)))
         .collect();
     frames
         .iter()
-        .map(|frame| stated.get(frame).copied())
+        .map(|frame| recorded.get(frame).copied())
         .collect()
 }
 
-/// Name of each level, in the order of tables, and its severity, as in `6 EV`.
+/// Name and severity of each distinct level in ascending order, such as `L3` and `6 EV`.
 pub(in crate::report) fn levels(levels: impl Iterator<Item = AxisLevel>) -> Vec<[String; 2]> {
     let levels: BTreeSet<AxisLevel> = levels.collect();
     levels
@@ -263,21 +266,21 @@ pub(in crate::report) fn levels(levels: impl Iterator<Item = AxisLevel>) -> Vec<
         .collect()
 }
 
-/// Selects the thumbnails of some frames that fit on a page, with the object crops that fit.
+/// Selects the thumbnails of `frames` that fit into the largest size limit. Removes object crops that do not fit.
 pub(crate) fn fitting_thumbnails<'a>(
     all: &[Thumbnail],
     frames: impl IntoIterator<Item = &'a FrameId>,
 ) -> Vec<Thumbnail> {
-    let numbers: HashMap<&str, usize> = frames
+    let indices: HashMap<&str, usize> = frames
         .into_iter()
         .enumerate()
-        .map(|(n, frame)| (&*frame.0, n))
+        .map(|(index, frame)| (&*frame.0, index))
         .collect();
-    let fitting = thumbnails(all, &numbers, SIZE_LIMITS[0].pictures);
+    let fitting = thumbnails(all, &indices, SIZE_LIMITS[0].pictures);
     all.iter()
         .filter_map(|thumbnail| {
-            let number = numbers.get(&*thumbnail.frame.0)?;
-            let picture = fitting.get(number)?.get(&thumbnail.condition.to_string())?;
+            let index = indices.get(&*thumbnail.frame.0)?;
+            let picture = fitting.get(index)?.get(&thumbnail.condition.to_string())?;
             Some(Thumbnail {
                 objects: picture.objects.to_vec(),
                 ..thumbnail.clone()
@@ -286,10 +289,11 @@ pub(crate) fn fitting_thumbnails<'a>(
         .collect()
 }
 
-/// Thumbnails of as many frames as the size limit allows, by the index of the frame. Object crops are added while bytes are left.
+/// Selects thumbnails, in the order of frame ids, until a frame exceeds `bytes_left`. The result is by frame index, from `indices`, and
+/// condition name. The object crops of a frame are included if they fit into the bytes that remain.
 pub(in crate::report) fn thumbnails<'a>(
     all: &'a [Thumbnail],
-    numbers: &HashMap<&str, usize>,
+    indices: &HashMap<&str, usize>,
     mut bytes_left: usize,
 ) -> BTreeMap<usize, BTreeMap<String, Picture<'a>>> {
     let mut by_frame = BTreeMap::<&FrameId, Vec<&Thumbnail>>::new();
@@ -302,7 +306,7 @@ pub(in crate::report) fn thumbnails<'a>(
     // Thumbnails of all frames take precedence over object crops of the first frames.
     let mut kept = Vec::new();
     for (frame, thumbnails) in by_frame {
-        let Some(number) = numbers.get(&*frame.0) else {
+        let Some(index) = indices.get(&*frame.0) else {
             continue;
         };
         let size: usize = thumbnails
@@ -313,10 +317,10 @@ pub(in crate::report) fn thumbnails<'a>(
             break;
         }
         bytes_left -= size;
-        kept.push((*number, thumbnails));
+        kept.push((*index, thumbnails));
     }
-    let mut by_number = BTreeMap::new();
-    for (number, thumbnails) in kept {
+    let mut by_index = BTreeMap::new();
+    for (index, thumbnails) in kept {
         let size: usize = thumbnails
             .iter()
             .flat_map(|thumbnail| &thumbnail.objects)
@@ -336,7 +340,7 @@ pub(in crate::report) fn thumbnails<'a>(
                 (thumbnail.condition.to_string(), picture)
             })
             .collect();
-        by_number.insert(number, pictures);
+        by_index.insert(index, pictures);
     }
-    by_number
+    by_index
 }

@@ -1,4 +1,4 @@
-//! The seeded random generator of this crate: [`SplitMix`].
+//! Seeded random generator of this crate: [`SplitMix`].
 
 use std::convert::Infallible;
 
@@ -6,11 +6,12 @@ use rand::TryRng;
 use rand::rand_core::utils::fill_bytes_via_next_word;
 use rand::seq::SliceRandom as _;
 
-/// The random generator SplitMix64 (Steele, Lea and Flood 2014, OOPSLA, figure 13), for the distributions of `rand_distr`.
+/// SplitMix64 random generator (Steele, Lea and Flood 2014, OOPSLA, figure 13). The field is the state, at first the seed. Implements
+/// [`TryRng`] for the distributions of `rand_distr`.
 pub struct SplitMix(pub u64);
 
 impl SplitMix {
-    /// The next 64 random bits.
+    /// Returns the next 64 random bits.
     pub fn bits(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
@@ -19,7 +20,7 @@ impl SplitMix {
         z ^ (z >> 31)
     }
 
-    /// Shuffles values; all orders are equally likely.
+    /// Shuffles values; every order is equally likely.
     pub fn shuffle<T>(&mut self, values: &mut [T]) {
         values.shuffle(self);
     }
@@ -46,8 +47,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn draws_match_the_reference() {
-        // The first numbers of the reference implementation (Vigna, splitmix64.c) with seed 1234567.
+    fn bits_match_the_reference_implementation() {
+        // First outputs of the reference implementation (Vigna, splitmix64.c) with seed 1234567.
         let mut random = SplitMix(1_234_567);
         let first = [random.bits(), random.bits()];
         assert_eq!(

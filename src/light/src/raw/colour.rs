@@ -1,4 +1,4 @@
-//! Conversion between display colours and camera colours: [`Matrix`], [`rgb_to_camera`].
+//! Conversion between linear sRGB and the colour space of a camera: [`rgb_to_camera`], [`inverse`].
 
 /// 3 × 3 colour matrix, row by row, applied to a column vector of red, green and blue.
 pub(crate) type Matrix = [[f64; 3]; 3];
@@ -34,7 +34,7 @@ const SRGB_TO_XYZ: Matrix = [
     [0.0193339, 0.1191920, 0.9503041],
 ];
 
-/// Linear sRGB → camera, for a mix of the four cameras. Its rows sum to 1, so that grey stays grey (Brooks et al. 2019).
+/// Linear sRGB → camera, for a weighted mean of the four cameras. The rows sum to 1, so that grey stays grey (Brooks et al. 2019).
 ///
 /// `weights` must be non-negative and not all zero; their sum does not matter.
 #[must_use]
@@ -42,8 +42,8 @@ pub(crate) fn rgb_to_camera(weights: [f64; 4]) -> Matrix {
     let total: f64 = weights.iter().sum();
     let mut mix = [[0.0; 3]; 3];
     for (weight, camera) in weights.iter().zip(XYZ_TO_CAMERA) {
-        for (sum, row) in mix.iter_mut().zip(camera) {
-            for (sum, value) in sum.iter_mut().zip(row) {
+        for (mix_row, row) in mix.iter_mut().zip(camera) {
+            for (sum, value) in mix_row.iter_mut().zip(row) {
                 *sum += weight / total * value;
             }
         }
@@ -54,7 +54,7 @@ pub(crate) fn rgb_to_camera(weights: [f64; 4]) -> Matrix {
     })
 }
 
-/// Inverse of a matrix, by cofactors. The matrices of [`rgb_to_camera`] are far from singular.
+/// Inverse of a matrix, by cofactors. A zero determinant is not checked: the matrices of [`rgb_to_camera`] are far from singular.
 #[must_use]
 pub(crate) fn inverse(matrix: &Matrix) -> Matrix {
     let [a, b, c] = *matrix;
@@ -100,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn the_inverse_inverts() {
+    fn inverse_times_matrix_is_identity() {
         for weights in MIXES {
             let matrix = rgb_to_camera(weights);
             let identity = product(&matrix, &inverse(&matrix));
@@ -112,9 +112,9 @@ mod tests {
         }
     }
 
-    /// Expected values from an independent implementation.
+    /// The expected values are from an independent implementation.
     #[test]
-    fn mixes_have_the_expected_matrices() {
+    fn camera_mixes_match_reference_matrices() {
         let mean = [
             [0.6460054538, 0.2714313899, 0.0825631563],
             [0.0825578502, 0.7557543488, 0.161687801],

@@ -16,37 +16,37 @@ use crate::significance::{ALPHA, Significance, SwapMethod, least_p};
 use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{AxisLevel, Variant};
 
-/// Comparison of the models by their mean accuracy over the dark levels ([`is_dark`]) with equal weights, on raw images.
+/// Comparison of the models by mean accuracy over the dark levels ([`is_dark`]), with equal weights, on images without an enhancer.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BestInTheDark {
-    /// Kind of degradation: the last kind that was asked (noise, if it was), in its first noise profile.
+    /// Compared variant: the last kind of degradation in the runs (noise, if present), with its first noise profile.
     pub variant: Variant,
-    /// Dark levels that every model was asked.
+    /// Dark levels at which every model was asked.
     pub levels: Vec<AxisLevel>,
-    /// Lighter levels that every model was asked, from L0.
+    /// Lighter levels at which every model was asked, L0 first.
     pub lighter: Vec<AxisLevel>,
-    /// Dark levels that at least one model was asked.
+    /// Dark levels at which at least one model was asked.
     pub asked: Vec<AxisLevel>,
-    /// Models with images that are not compared, because they were not asked at L0 and at a degraded level of this variant, or answered
-    /// fewer items than others there.
+    /// Models that saw images but are excluded: they lack L0 or a degraded level of this variant, or answered fewer items than others.
     pub without: Vec<String>,
-    /// Models with their accuracies, the best in the dark first. The first one is the leader.
+    /// Accuracies of the models by descending mean over the dark levels. The first model is the leader.
     pub models: Vec<DarkAccuracy>,
-    /// Models without a detected difference from the leader, in the order of `models`. If it is empty, the leader is shown to be the best.
+    /// Models that the leader does not beat significantly, in the order of `models`. Empty if the leader is significantly the best.
     pub not_shown_better_than: Vec<String>,
     /// All pairs of models, in the order of `models`.
     pub pairs: Vec<DarkPair>,
-    /// Leader of the lighter levels and leader of the dark levels, if they are two models whose order changes once.
+    /// Change of order between the leader at the lighter levels and the leader in the dark; `None` if both are one model or their order
+    /// changes more than once.
     pub crossing: Option<Crossing>,
     /// Number of items that every model answered at every level.
     pub items: usize,
-    /// Number of items that some model was asked at every level, left out because a model has no reply.
+    /// Number of items left out because a reply is missing or unread. At least one model was asked them at every level.
     pub dropped: usize,
     /// Number of clusters of the items.
     pub clusters: usize,
-    /// Smallest p-value that this number of clusters, c, allows: 2 / 2ᶜ.
+    /// Smallest possible p-value with c clusters: 2 / 2ᶜ.
     pub least_p: f64,
-    /// p-value of the leader being the best, after the correction over all tests behind sentences.
+    /// `p_leader` after the correction over all tests that the report's sentences use; `None` before that correction.
     pub p_report: Option<f64>,
 }
 
@@ -57,7 +57,7 @@ impl BestInTheDark {
         &self.models[0]
     }
 
-    /// True if the clusters allow a verdict on at least one pair.
+    /// True if there are enough clusters for at least one pair to be significant.
     #[must_use]
     pub fn is_possible(&self) -> bool {
         self.pairs
@@ -65,19 +65,19 @@ impl BestInTheDark {
             .any(|pair| pair.significance.is_possible())
     }
 
-    /// True if the leader is shown to be better than every other model, after the correction over the pairs only.
+    /// True if the leader is significantly better than every other model. Only the correction over all pairs is applied.
     #[must_use]
     pub fn is_shown(&self) -> bool {
         self.not_shown_better_than.is_empty()
     }
 
-    /// True if the leader is shown to be the best, also after the correction over all sentences.
+    /// True if the leader is significantly the best, also after the correction over all tests that the report's sentences use.
     #[must_use]
     pub fn is_detected(&self) -> bool {
         self.is_shown() && self.p_report.is_some_and(|value| value < ALPHA)
     }
 
-    /// p-value of the leader being the best: the largest one of its pairs, each after Holm's correction over all pairs.
+    /// p-value for the claim that the leader is the best: the largest p-value of its pairs after Holm's correction over all pairs.
     #[must_use]
     pub(crate) fn p_leader(&self) -> f64 {
         self.pairs
@@ -88,7 +88,7 @@ impl BestInTheDark {
     }
 }
 
-/// Mean accuracy of one model over the dark levels, on the items of all models.
+/// Accuracies of one model, on the items that all models answered.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DarkAccuracy {
     pub model: String,
@@ -100,20 +100,20 @@ pub struct DarkAccuracy {
     pub by_level: Vec<f64>,
     /// Accuracy at L0, on the same items.
     pub clean: Estimate,
-    /// `mean` minus the accuracy at L0; `None` if the latter is not above chance, because then nothing can be lost.
+    /// `mean` minus the accuracy at L0. `None` if the accuracy at L0 is not above chance, so that nothing can be lost.
     pub loss: Option<Estimate>,
 }
 
-/// One model against another by mean accuracy over the dark levels, on the items of all models.
+/// Comparison of two models by mean accuracy over the dark levels, on the items that all models answered.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DarkPair {
     pub first: String,
     pub second: String,
-    /// Mean accuracy of the first minus that of the second.
+    /// Mean accuracy of `first` minus mean accuracy of `second`.
     pub difference: Estimate,
-    /// p-value of no difference.
+    /// p-value of the null hypothesis of no difference.
     pub p: f64,
-    /// How the swaps were counted.
+    /// Method that computed `p`.
     pub p_by: SwapMethod,
     /// p-value after Holm's correction over all pairs of models.
     pub holm: f64,
@@ -123,22 +123,22 @@ pub struct DarkPair {
 /// Two models whose order changes once with the level.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Crossing {
-    /// Leader of the lighter levels, and the last level at which it is ahead.
+    /// Leader at the lighter levels, and the last level before the change of order.
     pub before: (String, AxisLevel),
-    /// Leader of the dark levels, and the first level at which it is ahead.
+    /// Leader in the dark, and the first level after the change of order.
     pub after: (String, AxisLevel),
-    /// Mean accuracy of the first minus that of the second, over the levels where the first is ahead.
+    /// Mean accuracy of the `before` model minus the `after` model, over the levels before the change of order.
     pub lead: Estimate,
-    /// The same difference over the levels where the second is ahead.
+    /// Mean accuracy of the `before` model minus the `after` model, over the levels after the change of order.
     pub lag: Estimate,
-    /// The larger of the two p-values, times the number of gaps between levels at which the order could change.
+    /// Larger p-value of `lead` and `lag`, times the number of gaps between levels (Bonferroni over the possible places of the change).
     pub p: f64,
-    /// p-value after the correction over all tests behind sentences.
+    /// `p` after the correction over all tests that the report's sentences use; `None` before that correction.
     pub p_report: Option<f64>,
 }
 
 impl Crossing {
-    /// True if the change of order is detected after that correction.
+    /// True if `p_report` is significant.
     #[must_use]
     pub fn is_detected(&self) -> bool {
         self.p_report.is_some_and(|value| value < ALPHA)
@@ -148,7 +148,7 @@ impl Crossing {
 /// Exposure drop of L3, in EV.
 const DARK_EV: f64 = 6.0;
 
-/// True if a level counts as dark: L3 (6 EV) and darker, or for another kind of degradation the third step of its ladder and beyond.
+/// True if a level counts as dark: the third step of its kind's ladder or a more severe level. Without a third step, L3 (6 EV) or darker.
 #[must_use]
 pub(crate) fn is_dark(level: AxisLevel, kind: Kind) -> bool {
     let threshold = kind
@@ -161,8 +161,9 @@ pub(crate) fn is_dark(level: AxisLevel, kind: Kind) -> bool {
 /// A model and the levels at which it was asked.
 type Asked<'g> = (&'g str, BTreeSet<AxisLevel>);
 
-/// Compares the models in the dark, in one parsing. If they share no dark level, the darkest shared level counts as dark. `None` if fewer
-/// than two models were asked at L0 and at a degraded level, if the models share no item, or if there are too many models to compare.
+/// Compares the models in the dark, with replies parsed in `mode`. If the models share no dark level, the darkest shared level counts as
+/// dark. `None` if the grid has too many models to compare, if fewer than two models were asked at L0 and at a degraded level, or if
+/// the models share no degraded level or no item.
 #[must_use]
 pub fn best_in_the_dark(grid: &Grid<'_>, mode: ParsingMode) -> Option<BestInTheDark> {
     if !compares_models(grid) {
@@ -170,31 +171,31 @@ pub fn best_in_the_dark(grid: &Grid<'_>, mode: ParsingMode) -> Option<BestInTheD
     }
     let variant = grid.main_variant()?;
     let kind = variant.kind?;
-    let (curves, mut without): (Vec<Asked<'_>>, Vec<Asked<'_>>) = pool(grid)
+    let (compared, mut without): (Vec<Asked<'_>>, Vec<Asked<'_>>) = pool(grid)
         .into_iter()
         .map(|model| (model, levels(grid, model, &variant)))
         .partition(|(_, levels)| levels.len() > 1 && levels.contains(&AxisLevel::L0));
-    let (curves, incomplete) = split_by_coverage(grid, curves, &variant);
+    let (compared, incomplete) = split_by_coverage(grid, compared, &variant);
     without.extend(incomplete);
-    let levels: Vec<AxisLevel> = curves
+    let levels: Vec<AxisLevel> = compared
         .first()?
         .1
         .iter()
         .copied()
-        .filter(|level| curves.iter().all(|(_, levels)| levels.contains(level)))
+        .filter(|level| compared.iter().all(|(_, levels)| levels.contains(level)))
         .collect();
-    if curves.len() < 2 || levels.len() < 2 {
+    if compared.len() < 2 || levels.len() < 2 {
         return None;
     }
-    let dark = levels.iter().filter(|level| is_dark(**level, kind)).count();
-    let (lighter, dark) = levels.split_at(levels.len() - dark.max(1));
-    let asked: BTreeSet<AxisLevel> = curves
+    let dark_count = levels.iter().filter(|level| is_dark(**level, kind)).count();
+    let (lighter, dark) = levels.split_at(levels.len() - dark_count.max(1));
+    let asked: BTreeSet<AxisLevel> = compared
         .iter()
         .flat_map(|(_, levels)| levels)
         .copied()
         .filter(|level| *level >= dark[0])
         .collect();
-    let names: Vec<&str> = curves.iter().map(|(model, _)| *model).collect();
+    let names: Vec<&str> = compared.iter().map(|(model, _)| *model).collect();
     let scores = Scores::new(grid, &names, &variant, &levels, mode);
     if scores.items.is_empty() {
         return None;
@@ -232,7 +233,7 @@ pub fn best_in_the_dark(grid: &Grid<'_>, mode: ParsingMode) -> Option<BestInTheD
     })
 }
 
-/// Levels at which a model was asked about raw images of a variant; L0 is included if the clean frames are from the same runs.
+/// Levels at which a model was asked about images of a variant without an enhancer. L0 is included if it was asked in the same runs.
 fn levels(grid: &Grid<'_>, model: &str, variant: &Variant) -> BTreeSet<AxisLevel> {
     let clean = ModelInCondition::with_images(model, AxisLevel::L0, variant, None);
     grid.subjects
@@ -246,8 +247,8 @@ fn levels(grid: &Grid<'_>, model: &str, variant: &Variant) -> BTreeSet<AxisLevel
         .collect()
 }
 
-/// Splits the models into those with enough answered items and those with fewer. The latter are left out, so that they do not reduce the
-/// items of the others.
+/// Splits the models into those with complete coverage and those with too few answered items. An incomplete model would reduce the items
+/// on which all models are compared.
 fn split_by_coverage<'g>(
     grid: &Grid<'_>,
     models: Vec<Asked<'g>>,
@@ -279,9 +280,9 @@ fn split_by_coverage<'g>(
     (complete, incomplete)
 }
 
-/// Right replies of all models to an item that every model answered at every level.
+/// Scores of all models on one item that every model answered at every level.
 struct ItemScores {
-    /// Index of the cluster.
+    /// Index of the item's cluster.
     cluster: usize,
     /// True if a model is right at a level; by model, then by level.
     right: Vec<Vec<bool>>,
@@ -291,7 +292,7 @@ struct ItemScores {
 
 impl ItemScores {
     /// Number of levels in a range at which a model is right.
-    fn right(&self, model: usize, levels: &Range<usize>) -> i64 {
+    fn right_count(&self, model: usize, levels: &Range<usize>) -> i64 {
         self.right[model][levels.clone()]
             .iter()
             .map(|right| i64::from(*right))
@@ -299,12 +300,12 @@ impl ItemScores {
     }
 }
 
-/// Right replies of all models to the items that every model answered at every level.
+/// Scores of all models on the items that every model answered at every level.
 struct Scores {
     items: Vec<ItemScores>,
     /// Number of levels.
     levels: usize,
-    /// Number of items that are left out because a model has no reply.
+    /// Number of items left out because a reply is missing or unread (see [`BestInTheDark::dropped`]).
     dropped: usize,
     /// Number of clusters of the whole grid.
     all_clusters: usize,
@@ -382,7 +383,7 @@ impl Scores {
         sums
     }
 
-    /// Tests a difference of each item, whose maximum is `scale`.
+    /// Tests the mean of a difference by item. `scale` is the largest possible difference of an item.
     fn test(&self, scale: usize, difference: impl Fn(&ItemScores) -> i64) -> PairedTest {
         let squares: i64 = self.items.iter().map(|item| difference(item).pow(2)).sum();
         PairedTest::new(
@@ -395,11 +396,11 @@ impl Scores {
     /// Tests the mean accuracy of the first model minus that of the second over a range of levels.
     fn test_pair(&self, [first, second]: [usize; 2], levels: Range<usize>) -> PairedTest {
         self.test(levels.len(), |item| {
-            item.right(first, &levels) - item.right(second, &levels)
+            item.right_count(first, &levels) - item.right_count(second, &levels)
         })
     }
 
-    /// Computes the accuracies of a model, given by its index; the levels from `split` on are dark.
+    /// Computes the accuracies of the model with index `model`. Levels from index `split` on are dark.
     fn accuracy(&self, model: usize, name: &str, split: usize) -> Option<DarkAccuracy> {
         let (n, dark) = (self.items.len(), split..self.levels);
         let by_level: Vec<f64> = (0..self.levels)
@@ -413,12 +414,12 @@ impl Scores {
             .collect();
         let count = dark.len() as f64;
         let sums: Vec<(f64, f64)> = self
-            .cluster_sums(|item| item.right(model, &dark))
+            .cluster_sums(|item| item.right_count(model, &dark))
             .into_iter()
             .map(|sum| (sum.net as f64 / count, f64::from(sum.items)))
             .collect();
         let clean_counts: Vec<ClusterCount> = self
-            .cluster_sums(|item| item.right(model, &(0..1)))
+            .cluster_sums(|item| item.right_count(model, &(0..1)))
             .into_iter()
             .map(|sum| ClusterCount {
                 right: sum.net as u32,
@@ -429,7 +430,8 @@ impl Scores {
         let chance = self.items.iter().map(|item| item.guess).sum::<f64>() / n as f64;
         let loss = (clean.low > chance).then(|| {
             self.test(dark.len(), |item| {
-                item.right(model, &dark) - item.right(model, &(0..1)) * dark.len() as i64
+                item.right_count(model, &dark)
+                    - item.right_count(model, &(0..1)) * dark.len() as i64
             })
             .difference
         });
@@ -443,7 +445,7 @@ impl Scores {
         })
     }
 
-    /// Tests all pairs of models, given with their indices.
+    /// Tests all pairs of `models`, which come with their indices in the scores. Levels from index `split` on are dark.
     fn pairs(&self, models: &[(DarkAccuracy, usize)], split: usize) -> Vec<DarkPair> {
         let mut pairs = Vec::new();
         for (index, (first, a)) in models.iter().enumerate() {
@@ -469,11 +471,11 @@ impl Scores {
         pairs
     }
 
-    /// Tests the change of order between the leader of the lighter levels and the leader of the dark ones; `None` if both are the same
-    /// model, or if their order changes more than once.
+    /// Tests the change of order between the leader at the lighter levels and the leader in the dark. `None` if both are the same model, or
+    /// if their order does not change exactly once.
     fn crossing(&self, models: &[(DarkAccuracy, usize)], levels: &[AxisLevel]) -> Option<Crossing> {
         let (dark, dark_index) = models.first()?;
-        // `rev`, because `max_by` returns the last of equal elements; the first one is better in the dark.
+        // `max_by` returns the last of equal elements; with `rev` that is the model with the higher accuracy in the dark.
         let (light, light_index) = models
             .iter()
             .rev()

@@ -1,15 +1,17 @@
-//! Agreement of each model with its own answers at L0, for questions without known true answers: [`SelfAgreement`].
+//! Agreement of each model with its own answers at L0, for questions whose true answers are unknown: [`SelfAgreement`].
 //!
-//! The reference of a model is its own answer at L0, for each question and order of choices. Trials are scored against it as they are
-//! scored against the truth elsewhere, so that the counts by cluster, the paired tests, Holm's correction and the thresholds of curves are
-//! computed as in the other reports. The results are agreements, not accuracies. By the triangle inequality, the accuracy that is lost in a
-//! condition is at most 1 minus the agreement there, whatever the true answers are.
+//! The reference answer is the model's own answer at L0, for each question and order of choices. It replaces the true answer in scoring,
+//! so the counts by cluster, the paired tests, Holm's correction and the thresholds of curves are those of the other reports. The results
+//! are agreements, not accuracies. By the triangle inequality, the accuracy lost in a condition is at most 1 minus the agreement in that
+//! condition, whatever the true answers are.
 //!
-//! Agreement alone is weak evidence: a model that answers no to everything agrees with itself. It is therefore reported together with κ,
-//! whose expected agreement is computed by question, the entropy of the answers, the agreement of the model without an image (the floor)
-//! and of the same question asked again at L0 (the ceiling), and the position of the agreement between floor and ceiling ([`evidence`]).
+//! Agreement alone is weak evidence: a model that answers no to everything agrees with itself. Four other results put it in context:
+//! - κ, with the expected agreement computed for each question;
+//! - the entropy of the answers;
+//! - the floor, the agreement without an image, and the ceiling, the agreement when a question is repeated at L0;
+//! - the position of the agreement between floor and ceiling ([`evidence`]).
 //!
-//! Sources: metamorphic testing without an oracle (Spieker and Gotlieb 2019, arXiv:1910.00262); flips of predictions under
+//! Sources: metamorphic testing without an oracle (Spieker and Gotlieb 2019, arXiv:1910.00262); prediction flips under
 //! corruption (Hendrycks and Dietterich 2019, arXiv:1903.12261, ImageNet-P); consistency of vision-language models under corruption
 //! (Bench-C, arXiv:2511.19032).
 
@@ -49,32 +51,32 @@ use darkqa_ground::types::{ChoiceDetail, ModelListing, RunQuestion, Trials};
 pub struct SelfAgreement<'a> {
     /// Answers by subject and item.
     pub grid: Grid<'a>,
-    /// Unit that is treated as independent.
+    /// Unit of clustering, treated as independent.
     pub unit: ClusterUnit,
     /// Counts of the replies of each model at L0, in each parsing.
     pub light: Vec<LightReplies>,
-    /// Agreement of each subject with the answers of its model at L0. The cell of L0 is about questions asked again.
+    /// Agreement of each subject with its model's answers at L0. At L0 itself, the agreement of repeated questions.
     pub cells: Vec<AgreementCell>,
-    /// Answers of each model to every question of the bank at L0, in the strict parsing.
+    /// Answers of each model at L0 to each question of the bank, in the strict parsing.
     pub questions: Vec<QuestionInLight>,
     /// Paired differences in agreement between the conditions of one model, in the strict parsing.
     pub comparisons: Vec<Comparison>,
-    /// The exposure drop at which half of the evidence is lost.
+    /// Curves of the evidence ([`evidence`]), with the exposure drop at which half of it is lost.
     pub curves: Vec<EvidenceCurve>,
-    /// Answers given against those at L0.
+    /// Confusion matrices of the answers in each condition against the answers at L0.
     pub confusions: Vec<Confusion>,
     /// Rates of “yes” if the answer at L0 is no, and vice versa.
     pub hallucinations: Vec<Hallucination>,
-    /// Counts of replies, unreadable replies and failures of each subject.
+    /// Counts of replies, unparsed replies and failures of each subject.
     pub health: Vec<Health>,
-    /// Agreement of each two models at L0.
+    /// Agreement between each pair of models at L0.
     pub between: Vec<ModelsInLight>,
-    /// Light in which the photographs were taken.
+    /// Real light in which the photographs were taken.
     pub set: PhotographedSet,
 }
 
 impl<'a> SelfAgreement<'a> {
-    /// Computes the results of trials without true answers. `ties` relates frames to each other.
+    /// Computes the results of trials without true answers. `ties` connects frames that belong to one cluster.
     #[must_use]
     pub fn new(
         trials: &'a Trials<ChoiceDetail>,
@@ -130,10 +132,10 @@ impl<'a> SelfAgreement<'a> {
                 }
             }
         }
-        // Sorted by kind, as in other reports; the sort is stable.
+        // The order of other reports. The sort is stable, so the levels of a variant stay in ascending order.
         all.comparisons
             .sort_by_key(|found| (found.kind, found.family.is_some()));
-        correct(&mut all.comparisons);
+        adjust_comparisons(&mut all.comparisons);
         all
     }
 
@@ -143,7 +145,7 @@ impl<'a> SelfAgreement<'a> {
         Self { set, ..self }
     }
 
-    /// Models, in the order of the listing.
+    /// Names of the models, in the order of the listing.
     pub fn models(&self) -> Vec<&str> {
         self.light
             .iter()
@@ -152,7 +154,7 @@ impl<'a> SelfAgreement<'a> {
             .collect()
     }
 
-    /// Number of items: questions about images, each in one order of its choices, without repeats.
+    /// Number of items, without repeats. An item is a question about an image in one order of its choices.
     pub fn items(&self) -> usize {
         self.grid
             .items
@@ -168,14 +170,14 @@ impl<'a> SelfAgreement<'a> {
             .find(|light| light.model == model && light.mode == ParsingMode::Strict)
     }
 
-    /// Cells of all families together in the strict parsing.
+    /// Cells over all question families, in the strict parsing.
     pub fn whole(&self) -> impl Iterator<Item = &AgreementCell> + Clone {
         self.cells
             .iter()
             .filter(|cell| cell.family.is_none() && cell.mode == ParsingMode::Strict)
     }
 
-    /// Number of informative questions of the bank for a model, and number of all its questions.
+    /// Numbers of informative questions and of all questions in the bank that a model was asked at L0.
     pub fn informative(&self, model: &str) -> (usize, usize) {
         let questions: Vec<&QuestionInLight> = self
             .questions
@@ -189,15 +191,16 @@ impl<'a> SelfAgreement<'a> {
         (informative, questions.len())
     }
 
-    /// True if the bank is uninformative about a model: to every question, the model gives the same answer about nearly all images.
+    /// True if no question of the bank is informative for a model: it answers each question alike for nearly all images.
     pub fn cannot_tell(&self, model: &str) -> bool {
         let (informative, all) = self.informative(model);
         informative == 0 && all > 0
     }
 }
 
-/// Corrects all comparisons behind sentences together: each model at the darkest level of each variant, and each enhancer at each level.
-fn correct(comparisons: &mut [Comparison]) {
+/// Sets `p_report` of the comparisons that the report's sentences use. They are corrected together: each model at the darkest testable
+/// level of each variant, and each enhancer at each level.
+fn adjust_comparisons(comparisons: &mut [Comparison]) {
     let mut darkest = BTreeMap::<_, usize>::new();
     let mut enhanced = BTreeMap::<_, Vec<usize>>::new();
     for (index, comparison) in comparisons.iter().enumerate() {
@@ -206,7 +209,7 @@ fn correct(comparisons: &mut [Comparison]) {
             continue;
         }
         match comparison.kind {
-            // The levels of a variant ascend: the last one is the darkest.
+            // The levels of a variant are in ascending order, so the last insert is the darkest level.
             ComparisonKind::Level => {
                 darkest.insert((first.model.clone(), first.variant.clone()), index);
             }
@@ -217,18 +220,18 @@ fn correct(comparisons: &mut [Comparison]) {
             _ => {}
         }
     }
-    let questions: Vec<Vec<usize>> = std::iter::once(darkest.into_values().collect())
+    let groups: Vec<Vec<usize>> = std::iter::once(darkest.into_values().collect())
         .chain(enhanced.into_values())
         .filter(|tests: &Vec<usize>| !tests.is_empty())
         .collect();
     let tests = TestTree::group(
-        questions
+        groups
             .iter()
             .map(|tests| TestTree::group(tests.iter().copied().map(TestTree::leaf))),
     );
     let corrected = adjust_p_values(&tests, |index: usize| comparisons[index].strict.paired.p);
     for (index, p) in corrected {
-        // The reference answers come from the strict parsing, so no lenient comparison exists.
+        // The reference answers are from the strict parsing, so a lenient comparison is not available.
         let comparison = &mut comparisons[index];
         comparison.strict.p_report = Some(p);
         comparison.lenient = comparison.strict.clone();
