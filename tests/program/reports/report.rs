@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use crate::support::run::{Bench, called, records, words};
-use crate::support::snapshot::{lines_with, redacted};
+use crate::support::snapshot::lines_with;
 use crate::support::table::check_rows;
 use serde_json::{Value, json};
 
