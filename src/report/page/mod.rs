@@ -202,8 +202,10 @@ pub(crate) fn page_of<'a>(
             groups: content.groups.all().iter().map(PageGroup::new).collect(),
             how_to_read: content.how_to_read,
             answers_title: content.answers_title,
-            intro: notes
-                .chain(content.intro)
+            intro: content
+                .intro
+                .into_iter()
+                .chain(notes)
                 .chain(sample::note(content.grid))
                 .collect(),
             sections: sections::sections(sections, content.tables, figures, inputs.thumbnails),
