@@ -29,8 +29,8 @@ impl NoiseProfiles {
             return None;
         };
         Some(format!(
-            "One noise profile was run ({only}). Whether the findings hold under another is not known: --profile all \
-             --resume DIR, with the flags of the run, asks the missing trials."
+            "One noise profile was run ({only}). Results under the others are unknown: --profile all --resume DIR, with the \
+             flags of the run, asks the missing trials."
         ))
     }
 }
