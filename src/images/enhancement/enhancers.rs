@@ -70,7 +70,7 @@ pub(crate) fn read_models(models: &[PathBuf]) -> Result<Vec<ModelFile>> {
 pub(crate) enum Model {
     /// Its file, without a session.
     File(ModelFile),
-    /// Its open session, with the digest of its file and sidecar ([`ModelFile::stated`]).
+    /// Its open session, with the digest of its file and sidecar ([`ModelFile::probe_digest`]).
     Open(Enhancer, Digest),
 }
 
