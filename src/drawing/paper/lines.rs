@@ -245,27 +245,12 @@ mod tests {
         }
     }
 
-    /// Bottom centre of the first label with a text.
-    fn label_position(sheet: &Sheet, text: &str) -> Point {
-        sheet
-            .shapes
-            .iter()
-            .find_map(|shape| match shape {
-                Shape::Label(label) if label.text == text => {
-                    let width = Font::bundled().width(text, label.size);
-                    Some([label.start[0] + width / 2.0, label.start[1]])
-                }
-                _ => None,
-            })
-            .unwrap()
-    }
-
     /// Exposure drops and shares of points on the sheet, read from the tick labels of the only panel.
     fn numbers(sheet: &Sheet, positions: &[Point]) -> Vec<[f64; 2]> {
-        let [_, top] = label_position(sheet, "100");
-        let [_, bottom] = label_position(sheet, "20");
-        let [first, _] = label_position(sheet, "L0");
-        let [last, _] = label_position(sheet, "L5");
+        let [_, top] = sheet.label_position("100");
+        let [_, bottom] = sheet.label_position("20");
+        let [first, _] = sheet.label_position("L0");
+        let [last, _] = sheet.label_position("L5");
         let offset = 0.35 * look().tick_font_size();
         positions
             .iter()

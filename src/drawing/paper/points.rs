@@ -184,21 +184,6 @@ mod tests {
         }
     }
 
-    /// Bottom centre of the first label with a text.
-    fn label_position(sheet: &Sheet, text: &str) -> Point {
-        sheet
-            .shapes
-            .iter()
-            .find_map(|shape| match shape {
-                Shape::Label(label) if label.text == text => {
-                    let width = Font::bundled().width(text, label.size);
-                    Some([label.start[0] + width / 2.0, label.start[1]])
-                }
-                _ => None,
-            })
-            .unwrap()
-    }
-
     #[test]
     fn points_are_drawn_at_their_axis_positions() {
         let line = vec![[6.0, -2.0], [8.0, 1.0], [10.0, 4.0]];
@@ -223,11 +208,11 @@ mod tests {
             .collect();
         assert_eq!(drawn.len(), 1);
         let [first, second, third] = [drawn[0][0], drawn[0][1], drawn[0][2]];
-        assert!((first[0] - label_position(&sheet, "6")[0]).abs() < 1e-9);
-        assert!((third[0] - label_position(&sheet, "10")[0]).abs() < 1e-9);
+        assert!((first[0] - sheet.label_position("6")[0]).abs() < 1e-9);
+        assert!((third[0] - sheet.label_position("10")[0]).abs() < 1e-9);
         let baseline = 0.35 * look().tick_font_size();
-        assert!((first[1] - (label_position(&sheet, "−2")[1] - baseline)).abs() < 1e-9);
-        assert!((third[1] - (label_position(&sheet, "4")[1] - baseline)).abs() < 1e-9);
+        assert!((first[1] - (sheet.label_position("−2")[1] - baseline)).abs() < 1e-9);
+        assert!((third[1] - (sheet.label_position("4")[1] - baseline)).abs() < 1e-9);
         let has_marker = sheet.shapes.iter().any(|shape| {
             matches!(shape, Shape::Disc { centre, .. } if (centre[0] - second[0]).abs() < 1e-9
                 && (centre[1] - second[1]).abs() < 1e-9)

@@ -106,6 +106,23 @@ pub(super) enum Anchor {
     End,
 }
 
+#[cfg(test)]
+impl Sheet {
+    /// Bottom centre of the first label with a text.
+    pub(super) fn label_position(&self, text: &str) -> Point {
+        self.shapes
+            .iter()
+            .find_map(|shape| match shape {
+                Shape::Label(label) if label.text == text => {
+                    let width = Font::bundled().width(text, label.size);
+                    Some([label.start[0] + width / 2.0, label.start[1]])
+                }
+                _ => None,
+            })
+            .unwrap()
+    }
+}
+
 impl Sheet {
     pub(super) fn line(&mut self, points: &[Point], stroke: &Stroke) {
         self.shapes.push(Shape::Line {
