@@ -33,6 +33,15 @@ static VARYING: LazyLock<Vec<(Regex, &str)>> = LazyLock::new(|| {
             "[DIGEST]",
         ),
         (r"[^:()\n]+ \(os error \d+\)".to_owned(), " [OS ERROR]"),
+        // The library that was found, and its own words, which differ between its versions.
+        (
+            r"\S*onnxruntime\S*\.(?:so|dylib|dll)[\w.]*".to_owned(),
+            "[LIBRARY]",
+        ),
+        (
+            r"(?s)\(Non-zero status code returned .*?\); ".to_owned(),
+            "([ONNX RUNTIME]); ",
+        ),
         (
             r"\b\d{4}-\d\d-\d\d(?:[T ]\d\d:\d\d(?::\d\d(?:\.\d+)?)?Z?)?".to_owned(),
             "[DATE]",

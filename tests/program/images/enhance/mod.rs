@@ -86,9 +86,9 @@ fn the_runtime_is_opened_once() {
     };
     let message = other.open().err().unwrap().to_string();
     insta::assert_snapshot!(redacted(&message), @"
-    ONNX Runtime: [TMP]/other.so cannot be loaded, because this process has already loaded
-        /root/.cache/darkqa-eval/onnxruntime/1.31.1/libonnxruntime.so.1.31.1; name a library of 1.17 or later with
-        --llie-options ort-lib=FILE or ORT_DYLIB_PATH, or leave both out to search for one
+    ONNX Runtime: [TMP]/other.so cannot be loaded, because this process has already loaded [LIBRARY]; name a
+        library of 1.17 or later with --llie-options ort-lib=FILE or ORT_DYLIB_PATH, or leave both out to search
+        for one
     ");
 }
 

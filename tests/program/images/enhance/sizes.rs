@@ -24,11 +24,9 @@ fn sides_are_filled_up_to_multiples() {
     let (_folder, mut wrong) = stated(&onnx::of_eights(), "multiple = 2");
     let message = wrong.enhance(&image).unwrap_err().to_string();
     insta::assert_snapshot!(redacted(&message), @"
-    [TMP]/model.onnx: failed on an image of 30 × 14 (Non-zero status code returned while running SpaceToDepth
-        node. Name:'' Status Message: SpaceToDepth requires input height to be a multiple of block_size);
-        `multiple = 2` in model.onnx.toml or the preset does not fit: it takes only sides that are multiples of 8
-        pixels (found by trial), so other images are padded; to confirm, add to model.onnx.toml next to it:
-        `multiple = 8`
+    [TMP]/model.onnx: failed on an image of 30 × 14 ([ONNX RUNTIME]); `multiple = 2` in model.onnx.toml or the
+        preset does not fit: it takes only sides that are multiples of 8 pixels (found by trial), so other images
+        are padded; to confirm, add to model.onnx.toml next to it: `multiple = 8`
     ");
 }
 
