@@ -227,4 +227,10 @@ mod tests {
             assert_eq!(BatchLine::read(wrong), None, "{wrong}");
         }
     }
+
+    #[test]
+    fn invalid_json_is_repaired() {
+        let line = r#"{"custom_id":"k","response":{"status_code":200,"body":{"choices":[{"message":{"content":"B \ud83d"},"finish_reason":"stop","logprobs":{"content":[{"token":"B","logprob":NaN}]}}]}}}"#;
+        assert_eq!(read_line(line).result.unwrap().text, "B \u{FFFD}");
+    }
 }

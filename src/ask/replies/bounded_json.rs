@@ -9,17 +9,28 @@ use std::fmt;
 use serde::de::{DeserializeSeed, Deserializer, Error, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use serde_json::{Map, Number, Value};
 
+use super::repair::repaired;
+
 /// Maximum number of values in one text; chosen: they take at most 150 MB.
 const MAX_VALUES: usize = 200_000;
 
 /// Maximum number of items in a list, and of fields in an object; chosen.
 pub(in crate::ask) const MAX_ITEMS: usize = 10_000;
 
-/// Parses a text that is one JSON value.
+/// Parses a text that is one JSON value, [repaired] if necessary.
 ///
 /// # Errors
 /// If the text is not a single complete JSON value.
 pub(in crate::ask) fn parse(text: &str) -> serde_json::Result<Value> {
+    parse_valid(text).or_else(|error| {
+        repaired(text)
+            .and_then(|text| parse_valid(&text).ok())
+            .ok_or(error)
+    })
+}
+
+/// Parses a text that is one valid JSON value.
+fn parse_valid(text: &str) -> serde_json::Result<Value> {
     let mut json = serde_json::Deserializer::from_str(text);
     let value = bounded(&mut json)?;
     json.end()?;

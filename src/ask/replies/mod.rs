@@ -1,4 +1,4 @@
-//! Robust parsing of the JSON in replies: bounded memory, repaired escapes.
+//! Robust parsing of the JSON in replies: bounded memory, and a repair of what servers write wrong.
 
 pub(super) mod bounded_json;
-pub(super) mod escapes;
+mod repair;

@@ -74,7 +74,7 @@ fn parse(text: &str, content_type: &str) -> Result<Value, ReplyError> {
             Unreadable::new(description).with_usage(usage).into()
         });
     }
-    json_body::parse_lenient(text, content_type)
+    json_body::parse_body(text, content_type)
 }
 
 /// The choice with index 0, or the first one if none has that index.

@@ -1,4 +1,4 @@
-//! Lenient parsing of the JSON in a response body: [`parse_lenient`].
+//! Parsing of the JSON in a response body: [`parse_body`].
 
 use std::borrow::Cow;
 
@@ -6,7 +6,6 @@ use serde_json::Value;
 
 use crate::ask::failures::{ReplyError, Unreadable, page_title};
 use crate::ask::replies::bounded_json::parse;
-use crate::ask::replies::escapes;
 
 /// Decodes a body as UTF-8 without a byte order mark; invalid bytes become replacement characters.
 pub(super) fn text(body: &[u8]) -> Cow<'_, str> {
@@ -16,13 +15,9 @@ pub(super) fn text(body: &[u8]) -> Cow<'_, str> {
     }
 }
 
-/// Parses JSON; unpaired surrogates become replacement characters.
-pub(super) fn parse_lenient(text: &str, content_type: &str) -> Result<Value, ReplyError> {
-    parse(text).or_else(|error| {
-        escapes::repaired(text)
-            .and_then(|text| parse(&text).ok())
-            .ok_or_else(|| unreadable(text, content_type, &error).into())
-    })
+/// Parses the JSON of a body.
+pub(super) fn parse_body(text: &str, content_type: &str) -> Result<Value, ReplyError> {
+    parse(text).map_err(|error| unreadable(text, content_type, &error).into())
 }
 
 /// String in a field of an object; `None` if the field is missing or of another type.

@@ -21,7 +21,7 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, ReplyError>
         last_response(&text)
             .ok_or_else(|| Unreadable::new("an event stream without a complete response"))?
     } else {
-        json_body::parse_lenient(&text, content_type)?
+        json_body::parse_body(&text, content_type)?
     };
     let api_error = match response.get("output") {
         Some(_) => ApiError::in_error(&response),
