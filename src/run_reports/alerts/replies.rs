@@ -1,12 +1,14 @@
 //! Alerts about replies that are not scored, or are scored as wrong: [`reply_alerts`], [`broken_off_alert`], [`people_alerts`].
 
+use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
 use crate::run_reports::combine::Combined;
 use crate::run_reports::settings::has_human_answers;
 use crate::text::alert::{Alert, AlertKind, MAX_UNREAD};
+use crate::text::outcome_words::failure_reason;
 use crate::text::words::counted;
-use crate::types::{TrialRef, UnreadReason};
+use crate::types::{FailureKind, TrialRef, UnreadReason};
 use darkqa_score::accuracies::Health;
 
 /// Alerts about replies that could not be parsed and about failed trials. `unread_as` completes the sentence about the former, for example
@@ -36,11 +38,34 @@ pub(super) fn reply_alerts(health: &[Health], unread_as: &str) -> Vec<Alert> {
         if failed > 0 {
             let trials = counted(failed, "trial");
             let are = if failed == 1 { "is" } else { "are" };
-            let text = format!("{trials} of {model} failed and {are} not scored.");
+            let reasons = failure_reasons(health, model);
+            let text = format!("{trials} of {model} failed and {are} not scored: {reasons}.");
             alerts.push(Alert::new(AlertKind::Failed, text));
         }
     }
     alerts
+}
+
+/// The reasons why trials of a model failed, the commonest first, with their numbers if there are several.
+fn failure_reasons(health: &[Health], model: &str) -> String {
+    let mut counts = BTreeMap::<FailureKind, usize>::new();
+    for (kind, count) in health
+        .iter()
+        .filter(|health| health.subject.model == model)
+        .flat_map(|health| &health.failed)
+    {
+        *counts.entry(*kind).or_default() += count;
+    }
+    let mut counts: Vec<(FailureKind, usize)> = counts.into_iter().collect();
+    counts.sort_by_key(|(_, count)| Reverse(*count));
+    if let [(kind, _)] = counts[..] {
+        return failure_reason(kind, None);
+    }
+    counts
+        .iter()
+        .map(|(kind, count)| format!("{} ({count})", failure_reason(*kind, None)))
+        .collect::<Vec<String>>()
+        .join(", ")
 }
 
 /// The condition of a model with the largest share of replies that could not be parsed, if the share is above [`MAX_UNREAD`].
@@ -138,6 +163,27 @@ mod tests {
         assert_eq!(
             alerts[0].text,
             "20 of 100 replies of m at L5-noise (20.0 %) could not be read, and count as wrong. The lenient parsing reads 20 of them."
+        );
+    }
+
+    #[test]
+    fn reasons_of_failures_are_counted() {
+        let failed = |counts: &[(FailureKind, usize)]| Health {
+            failed: counts.iter().copied().collect(),
+            ..health("L0", 100)
+        };
+        let one = [failed(&[(FailureKind::Timeout, 1)])];
+        assert_eq!(
+            reply_alerts(&one, "count as wrong")[0].text,
+            "1 trial of m failed and is not scored: no whole reply in time."
+        );
+        let several = [
+            failed(&[(FailureKind::Timeout, 1)]),
+            failed(&[(FailureKind::Timeout, 1), (FailureKind::Server, 5)]),
+        ];
+        assert_eq!(
+            reply_alerts(&several, "count as wrong")[0].text,
+            "7 trials of m failed and are not scored: the server failed (5), no whole reply in time (2)."
         );
     }
 }

@@ -99,6 +99,21 @@ fn missing_endpoint_is_noticed_soon() {
 }
 
 #[test]
+fn first_failure_is_described() {
+    let bench = Bench::with_frames();
+    let page = Answer::new(200, "<html><title>Sign in</title></html>".to_owned());
+    let endpoint = MockEndpoint::start([page, Answer::text("A")]);
+    let run = bench.call(&model_args(
+        &endpoint.base_url(),
+        "--data frames --retries 0 --concurrency 1 --levels L0 --out run",
+    ));
+    insta::assert_snapshot!(run.messages(), @r#"
+    exit code: 1
+     WARN m: a trial about a.png failed: http://127.0.0.1:[PORT]/v1 answered with an HTML page titled "Sign in"
+    "#);
+}
+
+#[test]
 fn changed_image_is_not_mixed() {
     let bench = Bench::with_frames();
     let later = Answer::error(429, "slow_down", "later").header("retry-after", "1");

@@ -24,6 +24,8 @@ fn broken_frame_removes_only_walk() {
         walks/hm3d-v0/000-a/00002-rgb.png: not an image: PNG, JPEG, WebP, TIFF, BMP or OpenEXR expected
      WARN 1 of 2 walks has fewer frames than --num-frames 3: they are shown several times in a request, as
         upstream does (the 2 frames of scannet-v0/001-b, for example)
+     WARN a trial failed: L0: hm3d-v0/000-a: walks/hm3d-v0/000-a/00002-rgb.png: not an image: PNG, JPEG, WebP,
+        TIFF, BMP or OpenEXR expected
     ");
     let failed = records(&house.0.path("run"));
     let failed: Vec<&Value> = failed
