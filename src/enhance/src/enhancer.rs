@@ -293,8 +293,8 @@ impl Enhancer {
         }
     }
 
-    /// Enhances an image padded to the first of [`MULTIPLES`] at which the model runs. Some models accept any size above a minimum, and
-    /// fail on smaller images.
+    /// Enhances an image padded to the first of [`MULTIPLES`] at which the model runs or exceeds a limit. Some models accept any size above
+    /// a minimum, and fail on smaller images.
     fn attempt_padded(&mut self, image: &Rgb, failure: RunFailure) -> Result<Attempt> {
         let size = [image.height(), image.width()];
         let mut tried = vec![size];
@@ -306,8 +306,9 @@ impl Enhancer {
             let whole = rule.run_size(size);
             if !tried.contains(&whole) {
                 tried.push(whole);
-                if let Ok(enhanced) = self.attempt(image, rule)? {
-                    return Ok(Ok(enhanced));
+                match self.attempt(image, rule)? {
+                    Err(failure) if failure.may_depend_on_size() => {}
+                    attempt => return Ok(attempt),
                 }
             }
         }

@@ -59,6 +59,20 @@ fn slow_image_fails_alone() {
     assert_eq!(enhancer.sizes().too_long, 5);
 }
 
+#[test]
+fn slow_padded_image_counts_as_slow() {
+    let (_folder, enhancer) = loaded(&onnx::endless_if_bright_from(&[32, 32]));
+    let limit = TimeLimit::new(Duration::from_millis(300));
+    let mut enhancer = enhancer.with_time_limit(limit);
+    let small = Rgb::new(4, 4, vec![200; 48]).unwrap();
+    let message = enhancer.enhance(&small).unwrap_err().to_string();
+    insta::assert_snapshot!(redacted(&message), @"
+    [TMP]/model.onnx: took longer than [TIME] for an image; allow more with --llie-options timeout=SECONDS (0: no
+        limit)
+    ");
+    assert_eq!(enhancer.sizes().too_long, 1);
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn memory_hungry_image_fails_alone() {
