@@ -446,7 +446,7 @@ impl Enhancer {
     fn run_error(&self, failure: &RunFailure, size: [usize; 2]) -> Error {
         let rule = self.rule(size);
         self.error(match failure {
-            RunFailure::NoMemory { requested, .. } if self.fails_when_small(rule, *requested) => format!(
+            RunFailure::NoMemory { fed, requested } if self.fails_when_small(rule, *fed, *requested) => format!(
                 "{} and on one of {}: its graph needs that memory at any size; export it again, or use a smaller model",
                 failure.message(),
                 format_size(rule.run_size([SMALL_SIDE; 2]))
@@ -462,11 +462,14 @@ impl Enhancer {
         })
     }
 
-    /// True if a run on a small image fails to allocate the same number of bytes.
-    fn fails_when_small(&self, rule: SizeRule, bytes: Option<u64>) -> bool {
+    /// True if a run on a small image of another size than `fed` fails to allocate the same number of bytes.
+    fn fails_when_small(&self, rule: SizeRule, fed: [usize; 2], bytes: Option<u64>) -> bool {
         let size = rule.run_size([SMALL_SIDE; 2]);
         self.graph.restart_clock();
         let image = Rgb::black(size[0], size[1]);
+        if size == fed {
+            return false;
+        }
         match self.graph.probe(&image, TileWindow::whole(size)) {
             Ok(RunResult::Failed(RunFailure::NoMemory { requested, .. })) => {
                 requested.is_some() && requested == bytes

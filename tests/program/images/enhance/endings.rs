@@ -73,6 +73,16 @@ fn slow_padded_image_counts_as_slow() {
     assert_eq!(enhancer.sizes().too_long, 1);
 }
 
+#[test]
+fn fixed_size_without_memory_names_export() {
+    let (_folder, mut enhancer) = loaded(&onnx::of_size(&onnx::of_much_memory(), 1, [40, 48]));
+    let message = enhancer.enhance(&image(40, 48)).unwrap_err().to_string();
+    insta::assert_snapshot!(redacted(&message), @"
+    [TMP]/model.onnx: ran out of memory on an image of 48 × 40: [MEMORY] were needed at once, [MEMORY] are free;
+        export it for a smaller size, or with dynamic_axes
+    ");
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn memory_hungry_image_fails_alone() {
