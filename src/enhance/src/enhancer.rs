@@ -272,8 +272,9 @@ impl Enhancer {
             return Ok(Err(failure));
         }
         let is_new = self.search.found().is_none();
+        let used = self.graph.used_time();
         let found = self.search.run(&self.graph)?;
-        self.graph.restart_clock();
+        self.graph.set_used_time(used);
         match (found, self.graph.convention.multiple) {
             (Some(found), Some(stated)) => Err(self.error(format!(
                 "{}; `multiple = {stated}` in MODEL.onnx.toml or the preset does not fit: {}",
@@ -377,8 +378,9 @@ impl Enhancer {
 
     /// Fails if a large run needs more memory than is available. The input has height and width `input`, the image `size`.
     fn check_memory(&mut self, rule: SizeRule, input: [usize; 2], size: [usize; 2]) -> Result<()> {
+        let used = self.graph.used_time();
         let checked = self.memory.run(&self.graph, rule, input, size)?;
-        self.graph.restart_clock();
+        self.graph.set_used_time(used);
         checked.map_err(|problem| self.error(problem))
     }
 
@@ -465,11 +467,11 @@ impl Enhancer {
     /// True if a run on a small image of another size than `fed` fails to allocate the same number of bytes.
     fn fails_when_small(&self, rule: SizeRule, fed: [usize; 2], bytes: Option<u64>) -> bool {
         let size = rule.run_size([SMALL_SIDE; 2]);
-        self.graph.restart_clock();
-        let image = Rgb::black(size[0], size[1]);
         if size == fed {
             return false;
         }
+        self.graph.restart_clock();
+        let image = Rgb::black(size[0], size[1]);
         match self.graph.probe(&image, TileWindow::whole(size)) {
             Ok(RunResult::Failed(RunFailure::NoMemory { requested, .. })) => {
                 requested.is_some() && requested == bytes
