@@ -520,6 +520,16 @@ pub fn weight(value: f32) -> Graph {
         .giving_image()
 }
 
+/// The same, with the number `1e38` in another file.
+pub fn weight_times_external(value: f32, file: &str) -> Graph {
+    Graph::new()
+        .constant("weight", &[1, 3, 1, 1], &[value; 3])
+        .external("huge", &[1, 1, 1, 1], file)
+        .node("Mul", &["weight", "huge"], "large")
+        .node("Add", &["input", "large"], "output")
+        .giving_image()
+}
+
 /// The gain lies in another file: four bytes, a little-endian float.
 pub fn external_gain(file: &str) -> Graph {
     Graph::new()

@@ -101,14 +101,14 @@ impl Enhancer {
         threads: Option<NonZeroUsize>,
         limits: LoadLimits,
     ) -> Result<Self> {
-        let flushed = file.weights.flush_subnormals(&mut file.bytes);
         let traced = traced_sizes(&file.bytes);
         let random = RandomOperators::find(&file.bytes).unwrap_or_default();
-        // ONNX Runtime locates external data relative to the model's path, so such a model is loaded from its file.
-        let source = if file.weights.external.is_empty() {
-            GraphSource::Memory(random.with_seeds(file.bytes))
+        // ONNX Runtime locates external data relative to the model's path, so such a model is loaded from its file, without changes.
+        let (source, flushed) = if file.weights.external.is_empty() {
+            let flushed = file.weights.flush_subnormals(&mut file.bytes);
+            (GraphSource::Memory(random.with_seeds(file.bytes)), flushed)
         } else {
-            GraphSource::Path(file.path.clone())
+            (GraphSource::Path(file.path.clone()), 0)
         };
         let graph = Graph::load(
             source,
