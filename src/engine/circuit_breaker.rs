@@ -209,9 +209,9 @@ impl CircuitBreaker {
             _ => {
                 let source_failures = health.outage_sources.entry(source.to_owned()).or_default();
                 *source_failures += 1;
-                let is_down = *kind == FailureKind::Connection && message.contains("connect error");
-                let counts =
-                    *source_failures <= MAX_FAILURES_PER_SOURCE || !may_be_cause || is_down;
+                let counts = *source_failures <= MAX_FAILURES_PER_SOURCE
+                    || !may_be_cause
+                    || error.is_unconnected();
                 health.outage += usize::from(counts);
             }
         }
@@ -276,9 +276,11 @@ mod tests {
         CircuitBreaker::new(&models, 2, max_failures)
     }
 
+    /// Error of a request that was sent.
     fn error(kind: FailureKind, reach: Reach) -> AskError {
         AskError {
             reach,
+            may_have_effect: true,
             ..AskError::new(kind, "no".into())
         }
     }
@@ -350,6 +352,25 @@ mod tests {
                 breaker.failed(0, &failure, "a", may_be_cause);
             }
             assert_eq!(breaker.is_stopped(0), is_stopped);
+        }
+    }
+
+    #[test]
+    fn failures_to_connect_count_whatever_their_text() {
+        for (may_have_effect, message, is_stopped) in [
+            (false, "dns error: failed to lookup address", true),
+            (true, "broken after a tcp connect error", false),
+        ] {
+            let failure = AskError {
+                may_have_effect,
+                ..AskError::new(FailureKind::Connection, message.into())
+            };
+            let mut breaker = breaker(1, None);
+            breaker.succeeded(0);
+            for _ in 0..20 {
+                breaker.failed(0, &failure, "a", true);
+            }
+            assert_eq!(breaker.is_stopped(0), is_stopped, "{message}");
         }
     }
 

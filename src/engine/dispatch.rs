@@ -563,15 +563,16 @@ impl<I: Item> ReplySink<'_, I> {
             if self.breaker.is_stopped(*model) {
                 continue;
             }
-            match kind {
+            if *kind == FailureKind::Image {
                 // The message names the frame, and the image fails for all models.
-                FailureKind::Image => tracing::warn!("a trial failed: {}", failure.message),
-                _ => tracing::warn!(
+                tracing::warn!("a trial failed: {}", failure.message);
+            } else {
+                tracing::warn!(
                     "{}: a trial about {} failed: {}",
                     self.dispatcher.models[*model].name,
                     failure.source,
                     failure.message
-                ),
+                );
             }
         }
     }

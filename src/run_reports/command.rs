@@ -82,9 +82,9 @@ pub(crate) struct BaselineArgs {
     /// default: no comparison
     #[arg(long, value_name = "OLD", add = Decides::Nothing)]
     pub baseline: Option<PathBuf>,
-    /// Exit with 1 if any model is detected to be worse than the baseline in any condition, and with 2 if no verdict about any is
-    /// possible. Of unchanged models, at most 5 % of reports do so, whatever the number of models and conditions; the report names the
-    /// smallest loss that it could detect. random and the observer are no models
+    /// Exit with 1 if any model is detected to be worse than in OLD in any condition, else with 2 if a model or condition of OLD is not
+    /// compared or no verdict is possible. If no model changed, at most 5 % of reports exit with 1, whatever the number of models and
+    /// conditions. The report names the smallest loss detected with 80 % power. random and the observer do not count as models
     #[arg(long, add = Decides::Nothing)]
     pub fail_if_worse: bool,
 }

@@ -250,10 +250,12 @@ fn unreachable_address_is_reported_at_once() {
 /// A server that turns requests away is waited for, half an hour by default: the user learns why nothing happens.
 #[test]
 fn refusing_server_is_reported_while_waiting() {
-    let away = || Answer::error(429, "x", "slow down").header("retry-after", "0.1");
-    let mut answers: Vec<Answer> = (0..8).map(|_| away()).collect();
-    answers.push(Answer::text("A"));
-    let mock = MockEndpoint::start(answers);
+    // The second refusal comes after half of the patience of 8 s, with seconds to spare before its end.
+    let mock = MockEndpoint::start([
+        Answer::error(429, "x", "slow down").header("retry-after", "4.5"),
+        Answer::error(429, "x", "slow down").header("retry-after", "0.1"),
+        Answer::text("A"),
+    ]);
     let bench = Bench::with_questions(1);
     let line = "--data set.jsonl --levels L0 --out run --retries patience=";
     let waited = |patience: &str| {
@@ -264,7 +266,7 @@ fn refusing_server_is_reported_while_waiting() {
             .filter(|line| line.contains("waiting: "));
         (called.code, lines.map(str::to_owned).collect::<Vec<_>>())
     };
-    let (code, told) = waited("1");
+    let (code, told) = waited("8");
     assert_eq!((code, told.len()), (Some(0), 1), "{told:?}");
     insta::assert_snapshot!(redacted(&told[0]), @"
     WARN http://127.0.0.1:[PORT]/v1 answered 429: slow down; waiting: no request was accepted for [TIME], and the
@@ -272,7 +274,7 @@ fn refusing_server_is_reported_while_waiting() {
     ");
     // Without a refusal nothing is told.
     fs::remove_dir_all(bench.path("run")).unwrap();
-    assert_eq!(waited("1"), (Some(0), Vec::new()));
+    assert_eq!(waited("8"), (Some(0), Vec::new()));
 }
 
 #[test]

@@ -364,6 +364,11 @@ pub fn slow_to_load() -> Graph {
 
 /// The image after 2⁴⁰ turns of a loop where it is brighter than a half, and after one where it is not.
 pub fn endless_if_bright() -> Graph {
+    endless_if_bright_from(&[1, 1])
+}
+
+/// The same, for images of at least this height and width; it fails on smaller ones.
+pub fn endless_if_bright_from(size: &'static [u64]) -> Graph {
     let body = Graph::empty()
         .input("turn", Type::Long, &[])
         .input("goes_on", Type::Bool, &[])
@@ -376,8 +381,14 @@ pub fn endless_if_bright() -> Graph {
         .shape("turns", &[1 << 40])
         .constant("half", &[], &[0.5])
         .node_with(
-            "ReduceMax",
+            "MaxPool",
             &["input"],
+            "pooled",
+            &[("kernel_shape", Attribute::Ints(size))],
+        )
+        .node_with(
+            "ReduceMax",
+            &["pooled"],
             "most",
             &[("keepdims", Attribute::Int(0))],
         )
@@ -504,6 +515,16 @@ pub fn weight(value: f32) -> Graph {
     Graph::new()
         .constant("weight", &[1, 3, 1, 1], &[value; 3])
         .constant("huge", &[], &[1e38])
+        .node("Mul", &["weight", "huge"], "large")
+        .node("Add", &["input", "large"], "output")
+        .giving_image()
+}
+
+/// The same, with the number `1e38` in another file.
+pub fn weight_times_external(value: f32, file: &str) -> Graph {
+    Graph::new()
+        .constant("weight", &[1, 3, 1, 1], &[value; 3])
+        .external("huge", &[1, 1, 1, 1], file)
         .node("Mul", &["weight", "huge"], "large")
         .node("Add", &["input", "large"], "output")
         .giving_image()

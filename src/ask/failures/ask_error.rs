@@ -122,6 +122,11 @@ impl AskError {
         !is_temporary && self.quota.is_none()
     }
 
+    /// True if no connection to the server could be made, so that the request was not sent.
+    pub(crate) fn is_unconnected(&self) -> bool {
+        self.failure.kind == FailureKind::Connection && !self.may_have_effect
+    }
+
     /// True if the server does not have the called API.
     pub(crate) fn is_unsupported(&self) -> bool {
         matches!(self.failure.status, Some(404 | 405 | 501))

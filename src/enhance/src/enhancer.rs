@@ -101,14 +101,14 @@ impl Enhancer {
         threads: Option<NonZeroUsize>,
         limits: LoadLimits,
     ) -> Result<Self> {
-        let flushed = file.weights.flush_subnormals(&mut file.bytes);
         let traced = traced_sizes(&file.bytes);
         let random = RandomOperators::find(&file.bytes).unwrap_or_default();
-        // ONNX Runtime locates external data relative to the model's path, so such a model is loaded from its file.
-        let source = if file.weights.external.is_empty() {
-            GraphSource::Memory(random.with_seeds(file.bytes))
+        // ONNX Runtime locates external data relative to the model's path, so such a model is loaded from its file, without changes.
+        let (source, flushed) = if file.weights.external.is_empty() {
+            let flushed = file.weights.flush_subnormals(&mut file.bytes);
+            (GraphSource::Memory(random.with_seeds(file.bytes)), flushed)
         } else {
-            GraphSource::Path(file.path.clone())
+            (GraphSource::Path(file.path.clone()), 0)
         };
         let graph = Graph::load(
             source,
@@ -272,8 +272,9 @@ impl Enhancer {
             return Ok(Err(failure));
         }
         let is_new = self.search.found().is_none();
+        let used = self.graph.used_time();
         let found = self.search.run(&self.graph)?;
-        self.graph.restart_clock();
+        self.graph.set_used_time(used);
         match (found, self.graph.convention.multiple) {
             (Some(found), Some(stated)) => Err(self.error(format!(
                 "{}; `multiple = {stated}` in MODEL.onnx.toml or the preset does not fit: {}",
@@ -293,8 +294,8 @@ impl Enhancer {
         }
     }
 
-    /// Enhances an image padded to the first of [`MULTIPLES`] at which the model runs. Some models accept any size above a minimum, and
-    /// fail on smaller images.
+    /// Enhances an image padded to the first of [`MULTIPLES`] at which the model runs or exceeds a limit. Some models accept any size above
+    /// a minimum, and fail on smaller images.
     fn attempt_padded(&mut self, image: &Rgb, failure: RunFailure) -> Result<Attempt> {
         let size = [image.height(), image.width()];
         let mut tried = vec![size];
@@ -306,8 +307,9 @@ impl Enhancer {
             let whole = rule.run_size(size);
             if !tried.contains(&whole) {
                 tried.push(whole);
-                if let Ok(enhanced) = self.attempt(image, rule)? {
-                    return Ok(Ok(enhanced));
+                match self.attempt(image, rule)? {
+                    Err(failure) if failure.may_depend_on_size() => {}
+                    attempt => return Ok(attempt),
                 }
             }
         }
@@ -376,8 +378,9 @@ impl Enhancer {
 
     /// Fails if a large run needs more memory than is available. The input has height and width `input`, the image `size`.
     fn check_memory(&mut self, rule: SizeRule, input: [usize; 2], size: [usize; 2]) -> Result<()> {
+        let used = self.graph.used_time();
         let checked = self.memory.run(&self.graph, rule, input, size)?;
-        self.graph.restart_clock();
+        self.graph.set_used_time(used);
         checked.map_err(|problem| self.error(problem))
     }
 
@@ -445,7 +448,7 @@ impl Enhancer {
     fn run_error(&self, failure: &RunFailure, size: [usize; 2]) -> Error {
         let rule = self.rule(size);
         self.error(match failure {
-            RunFailure::NoMemory { requested, .. } if self.fails_when_small(rule, *requested) => format!(
+            RunFailure::NoMemory { fed, requested } if self.fails_when_small(rule, *fed, *requested) => format!(
                 "{} and on one of {}: its graph needs that memory at any size; export it again, or use a smaller model",
                 failure.message(),
                 format_size(rule.run_size([SMALL_SIDE; 2]))
@@ -461,9 +464,12 @@ impl Enhancer {
         })
     }
 
-    /// True if a run on a small image fails to allocate the same number of bytes.
-    fn fails_when_small(&self, rule: SizeRule, bytes: Option<u64>) -> bool {
+    /// True if a run on a small image of another size than `fed` fails to allocate the same number of bytes.
+    fn fails_when_small(&self, rule: SizeRule, fed: [usize; 2], bytes: Option<u64>) -> bool {
         let size = rule.run_size([SMALL_SIDE; 2]);
+        if size == fed {
+            return false;
+        }
         self.graph.restart_clock();
         let image = Rgb::black(size[0], size[1]);
         match self.graph.probe(&image, TileWindow::whole(size)) {

@@ -20,9 +20,6 @@ pub(super) enum Tree {
     Archive(Arc<Archive>),
 }
 
-/// Maximum depth of subfolders to scan (chosen).
-const MAX_DEPTH: usize = 4;
-
 impl Tree {
     /// The tree of a folder, or the newest snapshot if the folder is a repository in a hub's cache.
     ///
@@ -75,7 +72,7 @@ impl Tree {
                     files: Vec::new(),
                     outside: Vec::new(),
                 };
-                scan.add_folder(folder, 0)?;
+                scan.add_folder(folder)?;
                 let files = scan
                     .files
                     .iter()
@@ -131,7 +128,7 @@ struct Scan {
 }
 
 impl Scan {
-    fn add_folder(&mut self, folder: &Path, depth: usize) -> Result<()> {
+    fn add_folder(&mut self, folder: &Path) -> Result<()> {
         for path in reading::entries(folder)? {
             let name = path.file_name().unwrap_or_default().to_string_lossy();
             if name.starts_with('.') {
@@ -141,9 +138,7 @@ impl Scan {
             if is_link && self.root.locate(&path) != Location::Inside {
                 self.outside.push(path);
             } else if path.is_dir() && !is_link {
-                if depth < MAX_DEPTH {
-                    self.add_folder(&path, depth + 1)?;
-                }
+                self.add_folder(&path)?;
             } else if path.is_file() {
                 self.files.push(path);
             }
@@ -155,6 +150,16 @@ impl Scan {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn files_of_any_depth_are_found() {
+        let root = tempfile::tempdir().unwrap();
+        let inner = Path::new("split=test/lang=en/year=2026/month=11/day=28");
+        fs::create_dir_all(root.path().join(inner)).unwrap();
+        fs::write(root.path().join(inner).join("0.parquet"), "").unwrap();
+        let (files, _) = Tree::from_folder(root.path()).unwrap().files().unwrap();
+        assert_eq!(files, [inner.join("0.parquet")]);
+    }
 
     #[cfg(unix)]
     #[test]

@@ -2,7 +2,7 @@
 
 use std::num::NonZeroUsize;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use ort::session::Session;
 
@@ -256,7 +256,17 @@ impl Graph {
 
     /// Restarts the clock for another image or a trial.
     pub(crate) fn restart_clock(&self) {
-        self.clock().restart();
+        self.set_used_time(Duration::ZERO);
+    }
+
+    /// Time that the current image has used so far.
+    pub(crate) fn used_time(&self) -> Duration {
+        self.clock().used()
+    }
+
+    /// Sets the time that the current image has used, after trials whose time does not count.
+    pub(crate) fn set_used_time(&self, used: Duration) {
+        self.clock().set_used(used);
     }
 
     fn clock(&self) -> MutexGuard<'_, ImageClock> {

@@ -92,7 +92,8 @@ fn format_gigabytes(bytes: u64) -> String {
 /// Remedy for a run without enough memory.
 fn remedy(rule: SizeRule, input_size: [usize; 2], image_size: [usize; 2]) -> String {
     const SMALLER: &str = "--llie-options max-side=1280 enhances a smaller image";
-    let is_much_larger = input_size[0] * input_size[1] > 4 * image_size[0] * image_size[1];
+    let input_pixels = input_size[0].saturating_mul(input_size[1]);
+    let is_much_larger = input_pixels > 4 * image_size[0] * image_size[1];
     match rule.tile {
         _ if is_much_larger && !rule.takes_any_size() => format!(
             "the image has only {}: check the size that its graph or MODEL.onnx.toml fixes",
@@ -152,4 +153,22 @@ fn probe(graph: &Graph, side: usize, arena: Arena) -> Result<bool> {
     let image = texture([side; 2], &CODES[1]);
     let result = graph.probe_memory(&image, window, arena)?;
     Ok(!matches!(result, RunResult::Failed(_)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::conventions::Padding;
+    use crate::conventions::sidecar::ModelSidecar;
+
+    #[test]
+    fn remedy_for_huge_size_names_image() {
+        let side = 1 << 32;
+        let rule = SizeRule::new([Some(side); 2], &ModelSidecar::default(), Padding::Zero);
+        let remedy = remedy(rule, [side; 2], [480, 640]);
+        assert!(
+            remedy.starts_with("the image has only 640 × 480"),
+            "{remedy}"
+        );
+    }
 }

@@ -93,9 +93,14 @@ impl ImageClock {
         self.used += time;
     }
 
-    /// Resets the clock for another image or trial.
-    pub(crate) fn restart(&mut self) {
-        self.used = Duration::ZERO;
+    /// Time used so far.
+    pub(crate) fn used(self) -> Duration {
+        self.used
+    }
+
+    /// Sets the time used so far; zero for another image or trial.
+    pub(crate) fn set_used(&mut self, used: Duration) {
+        self.used = used;
     }
 }
 
@@ -123,7 +128,7 @@ mod tests {
         assert_eq!(clock.remaining(), Some(Duration::from_millis(500)));
         clock.add(Duration::from_secs(9));
         assert_eq!(clock.remaining(), Some(Duration::ZERO));
-        clock.restart();
+        clock.set_used(Duration::ZERO);
         assert_eq!(clock.remaining(), Some(Duration::from_secs(2)));
         assert_eq!(ImageClock::new(TimeLimit::NONE).remaining(), None);
     }

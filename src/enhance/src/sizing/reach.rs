@@ -54,8 +54,9 @@ impl Context {
         }
         let size = rule.run_size([FREE_SIDE; 2]);
         if self.reach.is_none() {
+            let used = graph.used_time();
             self.reach = Some(Reach::probe(graph, size)?);
-            graph.restart_clock();
+            graph.set_used_time(used);
         }
         let reach = self.reach.clone().unwrap_or_else(|| Err(String::new()));
         Ok(reach.and_then(|reach| {
@@ -90,8 +91,9 @@ impl Context {
         if let Some(alignment) = self.alignment {
             return Ok(alignment);
         }
+        let used = graph.used_time();
         let found = find_alignment(graph, tile, context)?.unwrap_or(1);
-        graph.restart_clock();
+        graph.set_used_time(used);
         self.alignment = Some(found);
         Ok(found)
     }

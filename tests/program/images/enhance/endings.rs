@@ -59,6 +59,30 @@ fn slow_image_fails_alone() {
     assert_eq!(enhancer.sizes().too_long, 5);
 }
 
+#[test]
+fn slow_padded_image_counts_as_slow() {
+    let (_folder, enhancer) = loaded(&onnx::endless_if_bright_from(&[32, 32]));
+    let limit = TimeLimit::new(Duration::from_millis(300));
+    let mut enhancer = enhancer.with_time_limit(limit);
+    let small = Rgb::new(4, 4, vec![200; 48]).unwrap();
+    let message = enhancer.enhance(&small).unwrap_err().to_string();
+    insta::assert_snapshot!(redacted(&message), @"
+    [TMP]/model.onnx: took longer than [TIME] for an image; allow more with --llie-options timeout=SECONDS (0: no
+        limit)
+    ");
+    assert_eq!(enhancer.sizes().too_long, 1);
+}
+
+#[test]
+fn fixed_size_without_memory_names_export() {
+    let (_folder, mut enhancer) = loaded(&onnx::of_size(&onnx::of_much_memory(), 1, [40, 48]));
+    let message = enhancer.enhance(&image(40, 48)).unwrap_err().to_string();
+    insta::assert_snapshot!(redacted(&message), @"
+    [TMP]/model.onnx: ran out of memory on an image of 48 × 40: [MEMORY] were needed at once, [MEMORY] are free;
+        export it for a smaller size, or with dynamic_axes
+    ");
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn memory_hungry_image_fails_alone() {

@@ -64,6 +64,15 @@ fn external_data_beside_model_loads() {
 }
 
 #[test]
+fn weights_beside_external_data_stay_subnormal() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("huge.bin"), 1e38_f32.to_le_bytes()).unwrap();
+    let path = onnx::weight_times_external(1e-39, "huge.bin").write(folder.path(), "model.onnx");
+    let described = open(&path).unwrap().describe();
+    assert!(described.contains("subnormal weights  0 "), "{described}");
+}
+
+#[test]
 fn every_layout_returns_every_byte() {
     let image = image(12, 20);
     let any = [Named("height"), Named("width")];

@@ -3,6 +3,8 @@
 
 use std::fs;
 use std::process::{Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
 
@@ -121,7 +123,11 @@ fn interrupt_does_not_wait_for_retries() {
 #[test]
 fn closed_terminal_interrupts_unless_ignored() {
     let bench = Bench::with_frames();
-    let endpoint = MockEndpoint::answering(|_| {
+    // No reply comes before the signal.
+    let is_signalled = Arc::new(AtomicBool::new(false));
+    let may_answer = Arc::clone(&is_signalled);
+    let endpoint = MockEndpoint::answering(move |_| {
+        wait_until(|| may_answer.load(Ordering::SeqCst));
         thread::sleep(Duration::from_millis(300));
         Answer::text("A")
     });
@@ -130,6 +136,7 @@ fn closed_terminal_interrupts_unless_ignored() {
     let mut program = bench.spawn(&args, Stdio::null());
     wait_until(|| !endpoint.requests().is_empty());
     signal(&program, "-HUP");
+    is_signalled.store(true, Ordering::SeqCst);
     assert_eq!(program.wait().unwrap().code(), Some(130));
     let kept = records(&bench.path("run")).len();
     assert!(
