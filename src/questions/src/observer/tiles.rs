@@ -13,13 +13,13 @@ pub(super) const CODES: usize = 256;
 /// Minimum standard deviation of the untouched codes of a tile with contrast, in codes (chosen).
 const MIN_CONTRAST: f64 = 4.0;
 
-/// Sums over the pixels with the same untouched code, in one channel.
+/// Sums over the pixels with the same untouched code, in one channel; `T` is an integer while pixels are added.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct CodeSums {
+struct CodeSums<T> {
     /// Sum of the received codes.
-    pub(super) received: u64,
+    received: T,
     /// Sum of their squares.
-    pub(super) squares: u64,
+    squares: T,
 }
 
 /// Tiles of a frame, row by row, with the number of pixels of each untouched code.
@@ -43,7 +43,7 @@ pub(super) struct Tiles {
 
 /// Sums over the received codes, in the order of the codes of [`Tiles`].
 #[derive(Debug)]
-pub(super) struct TileSums(Vec<CodeSums>);
+pub(super) struct TileSums(Vec<CodeSums<f64>>);
 
 /// Pixels of one tile with the same untouched code in one channel.
 #[derive(Debug, Clone, Copy)]
@@ -119,7 +119,7 @@ impl Tiles {
     /// Sums the received codes of an image of the same size.
     pub(super) fn sums(&self, untouched: &[u8], received: &[u8]) -> TileSums {
         let mut sums = Vec::with_capacity(self.codes.len());
-        let mut row_of_tiles = vec![[[CodeSums::default(); CODES]; 3]; self.columns];
+        let mut row_of_tiles = vec![[[CodeSums::<u64>::default(); CODES]; 3]; self.columns];
         let (row, band) = (self.width * 3, (self.side * self.width * 3).max(1));
         let bands = untouched.chunks(band).zip(received.chunks(band));
         for (first, (untouched, received)) in (0..).step_by(self.columns.max(1)).zip(bands) {
@@ -134,11 +134,13 @@ impl Tiles {
             for (tile, table) in row_of_tiles.iter_mut().enumerate() {
                 for (channel, table) in table.iter_mut().enumerate() {
                     let codes = &self.codes[self.range(first + tile, channel)];
-                    sums.extend(
-                        codes
-                            .iter()
-                            .map(|code| std::mem::take(&mut table[usize::from(*code)])),
-                    );
+                    sums.extend(codes.iter().map(|code| {
+                        let sums = std::mem::take(&mut table[usize::from(*code)]);
+                        CodeSums {
+                            received: sums.received as f64,
+                            squares: sums.squares as f64,
+                        }
+                    }));
                 }
             }
         }
@@ -160,8 +162,8 @@ impl Tiles {
             .map(|((code, count), sums)| SameCode {
                 code: usize::from(*code),
                 count: f64::from(*count),
-                received: sums.received as f64,
-                squares: sums.squares as f64,
+                received: sums.received,
+                squares: sums.squares,
             })
     }
 
@@ -185,7 +187,7 @@ fn variance(counts: &[u32; CODES]) -> f64 {
 }
 
 /// Adds the pixels of a part of a row to the sums of a tile.
-fn add(sums: &mut [[CodeSums; CODES]; 3], untouched: &[u8], received: &[u8]) {
+fn add(sums: &mut [[CodeSums<u64>; CODES]; 3], untouched: &[u8], received: &[u8]) {
     let (untouched, _) = untouched.as_chunks::<3>();
     let (received, _) = received.as_chunks::<3>();
     for (untouched, received) in untouched.iter().zip(received) {
