@@ -585,6 +585,25 @@ fn best_model_is_chosen_at_dark_levels() {
     );
 }
 
+#[test]
+fn change_of_leader_is_detected_in_both_parsings() {
+    let bright = scripted("bright", &at_noise_levels([99, 97, 97, 45, 35, 35]));
+    let steady = scripted("steady", &at_noise_levels([62, 58, 59, 61, 50, 51]));
+    let mut wordy_model = scripted("wordy", &at_noise_levels([40, 40, 40, 61, 50, 51]));
+    for condition in ["L3-noise", "L4-noise", "L5-noise"] {
+        wordy(&mut wordy_model, condition);
+    }
+    let best = of_kind(
+        &sentences_about(&[bright, steady, wordy_model].concat()),
+        "best",
+    );
+    assert!(
+        best[0].starts_with("· bright is better to L2, steady from L3. ("),
+        "{best:?}"
+    );
+    assert!(!best[0].contains("strict parsing alone"), "{best:?}");
+}
+
 /// L0 to L5 with noise, each with a percentage of right replies.
 fn at_noise_levels(percents: [usize; 6]) -> Vec<(&'static str, usize)> {
     [
