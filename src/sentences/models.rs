@@ -73,7 +73,7 @@ pub(super) fn best(findings: &Findings<'_>) -> Option<Sentence> {
     let clusters = numbers.clusters(best.clusters);
     let without = match &best.without[..] {
         [] => String::new(),
-        models => format!("; without {}, not asked in this way", models.join(", ")),
+        models => format!("; without {}, which answered less", models.join(", ")),
     };
     let detail = format!(
         "{} over {over}: {value} % [{low}, {high}]{loss}; {test}; n = {items} in {clusters}{without}",

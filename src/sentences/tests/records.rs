@@ -321,7 +321,7 @@ fn models_with_fewer_questions_are_left_out() {
     assert_eq!(with, without);
     let best = of_kind(&with_part, "best");
     assert!(
-        best[0].contains("n = 24 in 12 frames; without part,"),
+        best[0].contains("n = 24 in 12 frames; without part, which answered less"),
         "{best:?}"
     );
     let left_out = of_kind(&with_part, "left out");
