@@ -83,9 +83,13 @@ fn classes(folder: &Path) -> Result<BTreeMap<String, Vec<PathBuf>>> {
         classes.insert(name, found.images);
     }
     if classes.len() < 2 {
+        let found = if classes.is_empty() {
+            "no folder"
+        } else {
+            "1 folder"
+        };
         let problem = format_args!(
-            "{} folders with images in it; --label-folders needs one for each class, at least two",
-            classes.len()
+            "{found} with images in it; --label-folders needs one for each class, at least two"
         );
         return Err(Error::data(folder.display(), problem));
     }

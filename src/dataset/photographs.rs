@@ -94,10 +94,13 @@ impl Photographs {
         found.warn_of_unsupported(folder);
         root.warn_of_links_out(&scan.links_out);
         if sources.keys().any(|id| id.0.contains('/')) {
+            let images = match sources.len() {
+                1 => "1 image".to_owned(),
+                n => format!("{n} images"),
+            };
             notes.push(format!(
-                "{}: {} images in it and in the folders below, each named by its path from there",
-                folder.display(),
-                sources.len()
+                "{}: {images} in it and in the folders below, each named by its path from there",
+                folder.display()
             ));
         }
         Ok(Self {

@@ -252,8 +252,9 @@ impl<E: Experiment> OpenRun<'_, E> {
         )?;
         if copied > 0 {
             self.progress.note(&format!(
-                "{}: {copied} replies copied from parts of another division",
-                self.store.folder().display()
+                "{}: {} copied from parts of another division",
+                self.store.folder().display(),
+                plural(copied, "reply", "replies")
             ));
         }
         Ok(copied > 0)

@@ -30,7 +30,7 @@ struct Document<'a, H> {
     tables: BTreeMap<&'a str, Rows<'a>>,
 }
 
-/// Rows of tables that have the same columns; each row becomes an object.
+/// Rows of tables that have the same columns in their file; each row becomes an object. Tables without a file have no rows.
 pub(super) struct Rows<'a>(&'a [Table]);
 
 impl<'a> Rows<'a> {
@@ -45,6 +45,7 @@ impl Serialize for Rows<'_> {
         serializer.collect_seq(
             self.0
                 .iter()
+                .filter(|table| table.has_file())
                 .flat_map(|table| table.rows.iter().map(move |row| RowObject { table, row })),
         )
     }
@@ -81,13 +82,7 @@ pub(super) fn document(
         rows: (length != ReportLength::Findings).then(|| Rows::new(rows)),
         tables: tables
             .chunk_by(|one, other| one.name == other.name)
-            .filter(|parts| {
-                length == ReportLength::Full
-                    && parts[0]
-                        .columns
-                        .iter()
-                        .any(|column| !column.heads.csv.is_empty())
-            })
+            .filter(|parts| length == ReportLength::Full && parts.iter().any(Table::has_file))
             .map(|parts| (parts[0].name, Rows(parts)))
             .collect(),
     };
@@ -190,4 +185,27 @@ pub(crate) fn summary(
         &report.tables,
         length,
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::text::table::ColumnKind::Count;
+    use crate::text::table::TableBuilder;
+
+    #[test]
+    fn tables_without_csv_columns_have_no_rows() {
+        let tables = ["csv n | page n", "page n"].map(|heads| {
+            TableBuilder::new("readings", [1_usize])
+                .column(Count, heads, |row| *row)
+                .build()
+        });
+        let head = serde_json::json!({});
+        let text = document(head, &tables[0], &tables, ReportLength::Full).unwrap();
+        let document: serde_json::Value = serde_json::from_str(&text).unwrap();
+        assert_eq!(
+            document["tables"],
+            serde_json::json!({"readings": [{"n": 1}]})
+        );
+    }
 }

@@ -19,7 +19,7 @@ use crate::text::frame_count::frames;
 use crate::text::ladder::{Ladder, SeriesByLevel};
 use crate::text::noise_profiles::NoiseProfiles;
 use crate::text::terminal::render;
-use crate::text::words::{counted, percent, widest_reach_of};
+use crate::text::words::{counted, percent, plural, widest_reach_of};
 use crate::text::wrapped::{WIDTH, wrapped};
 use crate::types::manifests::RunManifest;
 use crate::types::{Axis, AxisLevel};
@@ -142,10 +142,7 @@ pub(super) fn head(report: &ChoiceReport<'_>) -> String {
         .collect();
     let replies: usize = findings.health.iter().map(|health| health.replies).sum();
     let failed: usize = findings.health.iter().map(Health::failures).sum();
-    let replies = match replies {
-        1 => "1 reply".to_owned(),
-        n => format!("{n} replies"),
-    };
+    let replies = plural(replies, "reply", "replies");
     format!(
         "{} · {} · {} · {replies}, {failed} failed · intervals by {}",
         everyone(grid),

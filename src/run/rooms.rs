@@ -15,6 +15,7 @@ use crate::images::workers::{ThreadArgs, pool};
 use crate::picture::{exr, png};
 use crate::rooms::{self, Room, Rooms};
 use crate::runs::Outcome;
+use crate::text::words::counted;
 use crate::types::manifests::Status;
 use crate::types::{Decides, FrameId, Labels, SegmentName};
 
@@ -82,7 +83,11 @@ pub(crate) fn rooms(args: &RoomsArgs, progress: &Progress) -> Result<Outcome> {
     Ok(Outcome::wrote(
         &args.out,
         Status::Complete,
-        format!("{}: {} frames\n", args.out.display(), frames.len()),
+        format!(
+            "{}: {}\n",
+            args.out.display(),
+            counted(frames.len(), "frame")
+        ),
     ))
 }
 

@@ -62,21 +62,21 @@ pub(super) fn best(findings: &Findings<'_>) -> Option<Sentence> {
             .find(|pair| pair.first == leader.model && pair.second == second.model)?;
         let difference = numbers.difference("", pair.difference);
         let p = numbers.p("p", best.p_report.unwrap_or(pair.holm));
-        format!("{difference} against {}, {p}", second.model)
-    };
-    let format = if best.is_detected() && !is_same {
-        ", detected in the strict parsing alone"
-    } else {
-        ""
+        let parsing = if best.is_detected() && !is_same {
+            ", detected in the strict parsing alone"
+        } else {
+            ""
+        };
+        format!("{difference} against {}, {p}{parsing}", second.model)
     };
     let items = numbers.count("n", best.items);
     let clusters = numbers.clusters(best.clusters);
     let without = match &best.without[..] {
         [] => String::new(),
-        models => format!("; without {}, not asked in this way", models.join(", ")),
+        models => format!("; without {}, which answered less", models.join(", ")),
     };
     let detail = format!(
-        "{} over {over}: {value} % [{low}, {high}]{loss}; {test}{format}; n = {items} in {clusters}{without}",
+        "{} over {over}: {value} % [{low}, {high}]{loss}; {test}; n = {items} in {clusters}{without}",
         leader.model
     );
     let sentence = numbers.sentence("best", tone, text, detail);

@@ -35,7 +35,7 @@ pub(super) fn readings(found: &[FindingByProfile], unit: ClusterUnit) -> Option<
     );
     let detail = format!(
         "{} under some; {} with opposite effects under two; {} with the opposite effect alone; {} open; corrected over all claims, models \
-         and profiles; the table by reading names them",
+         and profiles; the table by noise profile names them",
         numbers.count("some", some),
         numbers.count("reversed", reversed),
         numbers.count("none", none),

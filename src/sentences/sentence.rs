@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::text::words::{counted, p, points};
+use crate::text::words::{counted, points};
 use crate::types::{EnhancerName, ModelListing};
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::{Claim, PooledFinding};
@@ -168,23 +168,19 @@ impl Numbers {
         }
     }
 
-    /// Records a value, rounded to a number of decimals.
-    fn record(&mut self, name: &str, value: f64, decimals: i32) {
-        let scale = 10_f64.powi(decimals);
-        self.values
-            .insert(name.to_owned(), (value * scale).round() / scale);
-    }
-
     /// A count, with thousands separators.
     pub(super) fn count(&mut self, name: &str, count: usize) -> String {
-        self.record(name, count as f64, 0);
+        self.values.insert(name.to_owned(), count as f64);
         with_separators(count)
     }
 
-    /// A plain number.
+    /// A plain number. Zero has no sign.
     pub(super) fn number(&mut self, name: &str, value: f64, decimals: u8) -> String {
-        self.record(name, value, i32::from(decimals));
-        format!("{value:.*}", usize::from(decimals)).replace('-', "−")
+        let text = format!("{value:.*}", usize::from(decimals));
+        // Parsed from the text, because formatting and `round` treat halves differently. The sum of −0 and 0 is 0.
+        let rounded = text.parse().unwrap_or(value) + 0.0;
+        self.values.insert(name.to_owned(), rounded);
+        format!("{rounded:.*}", usize::from(decimals)).replace('-', "−")
     }
 
     /// A share in percent, without the sign.
@@ -199,7 +195,7 @@ impl Numbers {
 
     /// A difference in points with its sign, as `−4.8`.
     pub(super) fn points(&mut self, name: &str, difference: f64) -> String {
-        self.record(name, 100.0 * difference, 1);
+        self.number(name, 100.0 * difference, 1);
         points(difference)
     }
 
@@ -218,14 +214,10 @@ impl Numbers {
     /// A p-value, as `p = 0.036` or `p < 0.001`.
     pub(super) fn p(&mut self, name: &str, value: f64) -> String {
         if value < 0.001 {
-            self.record(name, 0.001, 3);
+            self.values.insert(name.to_owned(), 0.001);
             "p < 0.001".to_owned()
         } else {
-            let text = p(value);
-            // Parsed from the text, because formatting and `round` treat halves differently.
-            self.values
-                .insert(name.to_owned(), text.parse().unwrap_or(value));
-            format!("p = {text}")
+            format!("p = {}", self.number(name, value, 3))
         }
     }
 
@@ -309,4 +301,20 @@ pub(super) fn level_runs<T: PartialEq + ToString>(levels: &[T], all: &[T]) -> St
         })
         .collect();
     runs.join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_rounded_like_text() {
+        let mut numbers = Numbers::new(ClusterUnit::Scene);
+        assert_eq!(numbers.percent("share", 0.0625), "6.2");
+        assert_eq!(numbers.points("effect", -0.0625), "−6.2");
+        assert_eq!(numbers.number("kappa", -0.001, 2), "0.00");
+        let values = [("effect", -6.2), ("kappa", 0.0), ("share", 6.2)]
+            .map(|(name, value)| (name.to_owned(), value));
+        assert_eq!(numbers.values, BTreeMap::from(values));
+    }
 }

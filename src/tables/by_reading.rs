@@ -90,7 +90,7 @@ fn report_table(findings: &Findings<'_>, readings: &[&ProfileName]) -> Table {
     let mut table = TableBuilder::new("readings", &rows)
         .page(
             "readings",
-            "Findings by reading, in percentage points [95 %]",
+            "Findings by noise profile, in percentage points [95 %]",
         )
         .column(Text, "terminal model | page model", |row| {
             subject(row.finding())
@@ -127,7 +127,7 @@ fn report_table(findings: &Findings<'_>, readings: &[&ProfileName]) -> Table {
             Row::Thresholds(..) => TableCell::Blank,
         })
         .build();
-    let heading = "Does each finding hold under every reading? Effects in percentage points [95 %], on the same items";
+    let heading = "Does each finding hold under every noise profile? Effects in percentage points [95 %], on the same items";
     table.heading = Some(heading.to_owned());
     table.notes = notes(found);
     table

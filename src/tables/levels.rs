@@ -4,7 +4,7 @@ use crate::text::ladder::{Ladder, LadderRow};
 use crate::text::table::ColumnKind::Count;
 use crate::text::table::{ColumnKind, Table, TableCell, TableFormat, TableRow};
 use crate::text::terminal::{differing, texts};
-use crate::text::words::{ends, percent};
+use crate::text::words::{counted, ends, percent, plural};
 use crate::types::UnreadReason;
 use crate::types::degradations::Axis;
 use darkqa_score::accuracies::{AccuracyCell, AccuracySummary};
@@ -16,8 +16,8 @@ pub(super) fn levels(findings: &Findings<'_>) -> Vec<Table> {
     let mut tables = summary_tables(findings, &findings.summary, "");
     if let Some(common) = &findings.common {
         let items = format!(
-            " on the {} questions that all models with images answered",
-            common.shared_questions
+            " on the {} that all models with images answered",
+            counted(common.shared_questions, "question")
         );
         for mut table in summary_tables(findings, &common.summary, &items) {
             table.latex = Some(format!("Accuracy in \\%{items}."));
@@ -86,9 +86,9 @@ fn axis_table(
         format!("Accuracy in %{of}{items}")
     });
     table.latex = Some(format!(
-        "Accuracy in \\%{of} (strict parsing) with 95\\,\\% intervals by {}; {} items.",
+        "Accuracy in \\%{of} (strict parsing) with 95\\,\\% intervals by {}; {}.",
         findings.unit,
-        findings.grid.items.len()
+        counted(findings.grid.items.len(), "item")
     ));
     table
 }
@@ -177,21 +177,21 @@ fn notes(summary: &AccuracySummary, ladder: &Ladder<'_, AccuracyCell>) -> Vec<St
         .map(|cell| note_without_images(summary, cell))
         .collect();
     let mut all = summary.family_cells(None, ParsingMode::Strict);
-    let unit = if all.any(|cell| cell.always.is_some()) {
-        "orders of choices"
+    let (unit, units) = if all.any(|cell| cell.always.is_some()) {
+        ("order of choices", "orders of choices")
     } else {
-        "questions"
+        ("question", "questions")
     };
     let chance = chance.into_iter().filter_map(|cell| cell.accuracy);
     notes.extend(chance.map(|chance| {
         let share = 100.0 * chance.value;
-        format!("chance: {share:.2} over {} {unit}", chance.n)
+        format!("chance: {share:.2} over {}", plural(chance.n, unit, units))
     }));
     notes.extend(summary.chance_of_questions.map(|once| {
         let share = 100.0 * once.value;
         format!(
-            "chance with each question once, as the paper counts: {share:.2} over {} questions",
-            once.n
+            "chance with each question once, as the paper counts: {share:.2} over {}",
+            counted(once.n, "question")
         )
     }));
     notes.extend(unread_note(summary));

@@ -35,11 +35,11 @@ pub(crate) const SECTIONS: [Section; 15] = [
     ),
     (
         "readings",
-        "Does each finding hold under every reading?",
-        "The paper’s noise can be read in several ways. Each finding is computed under every reading on the same items, at L1–L5. It \
-         holds where an effect on its side is detected after Holm’s correction over all claims, models and readings, has the opposite \
-         where one on the other side is detected, and is open otherwise; the profiles contradict each other only if both are detected. The curves under each \
-         reading are in the figures of accuracy.",
+        "Does each finding hold under every noise profile?",
+        "The paper’s noise can be read in several ways, the noise profiles. Each finding is computed under every profile on the same items, \
+         at L1–L5. It holds where an effect on its side is detected after Holm’s correction over all claims, models and profiles, has the \
+         opposite where one on the other side is detected, and is open otherwise; the profiles contradict each other only if both are \
+         detected. The curves under each profile are in the figures of accuracy.",
         &[],
     ),
     (

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use crate::text::table::ColumnKind::{Number, Share, Text, Threshold};
 use crate::text::table::{Table, TableBuilder, TableCell};
-use crate::text::words::{counted, light};
+use crate::text::words::{counted, light, plural};
 use crate::types::AxisLevel;
 use crate::types::degradations::Axis;
 use darkqa_score::accuracies::Curve;
@@ -131,13 +131,10 @@ pub(crate) fn missing_threshold_reason(reason: &NoThreshold) -> String {
 
 /// Replies and clusters at a level that has too few of them.
 fn thin_level_text(level: &SparseLevel) -> String {
-    let replies = match level.replies {
-        1 => "1 reply".to_owned(),
-        replies => format!("{replies} replies"),
-    };
     format!(
-        "{} has {replies} in {}",
+        "{} has {} in {}",
         level.level,
+        plural(level.replies, "reply", "replies"),
         counted(level.clusters, "cluster")
     )
 }

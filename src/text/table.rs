@@ -267,6 +267,13 @@ impl Table {
         self
     }
 
+    /// True if the table is written to a CSV file.
+    pub(crate) fn has_file(&self) -> bool {
+        self.columns
+            .iter()
+            .any(|column| !column.heads.csv.is_empty())
+    }
+
     /// Removes the CSV columns, so that the table is not written to a file.
     pub(crate) fn without_file(mut self) -> Self {
         for column in &mut self.columns {

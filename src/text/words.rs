@@ -64,7 +64,11 @@ pub(crate) fn shorten_middle(name: &str, width: usize) -> String {
 
 /// A share (0 to 1) in percent, with one decimal and no percent sign.
 pub(crate) fn percent(share: f64) -> String {
-    format!("{:.1}", 100.0 * share).replace('-', "−")
+    let text = format!("{:.1}", 100.0 * share);
+    match &*text {
+        "-0.0" => "0.0".to_owned(),
+        _ => text.replace('-', "−"),
+    }
 }
 
 /// True if a condition (`L3-noise+lift`) or the title of a variant (`with noise + lift`) names this enhancer.
@@ -211,5 +215,16 @@ pub(crate) fn first_names<S: AsRef<str>>(names: &[S], most: usize) -> String {
     match others.len() {
         0 => first,
         more => format!("{first} and {more} more"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn zero_percent_has_no_sign() {
+        assert_eq!(percent(-0.0004), "0.0");
+        assert_eq!(percent(-0.0006), "−0.1");
     }
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::{FigureBuilder, Names};
 use crate::text::table::{Column, ColumnHeads, ColumnKind, Table, TableCell, TableRow};
-use crate::text::words::family as family_name;
+use crate::text::words::{counted, family as family_name};
 use crate::types::degradations::{Axis, Kind};
 use crate::types::{AxisLevel, EnhancerName, Family, Variant, View};
 use darkqa_score::choice::ParsingMode;
@@ -85,9 +85,9 @@ impl FigureBuilder<'_> {
     fn basis(&self) -> String {
         let (grid, unit) = (&self.findings.grid, self.findings.unit);
         format!(
-            "Strict parsing; below each number its 95 % interval by {unit}; {} items in {} {unit}s.",
-            grid.items.len(),
-            grid.clusters
+            "Strict parsing; below each number its 95 % interval by {unit}; {} in {}.",
+            counted(grid.items.len(), "item"),
+            counted(grid.clusters, &unit.to_string())
         )
     }
 

@@ -26,6 +26,7 @@ use crate::images::trials::{Item as _, Stimulus, Trial};
 use crate::report::forecast::money;
 use crate::runs::outcome::Outcome;
 use crate::store::StoredTrial;
+use crate::text::words::plural;
 use crate::types::TrialKey;
 use crate::types::manifests::Status;
 
@@ -195,8 +196,8 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
         let own = self.journal.open_requests();
         if remaining.in_batch > own {
             tracing::warn!(
-                "{} trials are in files of batch export and not asked here; import their replies with batch import",
-                remaining.in_batch - own
+                "{} in files of batch export and not asked here; import the replies with batch import",
+                plural(remaining.in_batch - own, "trial is", "trials are")
             );
         }
     }

@@ -6,6 +6,7 @@ use crate::ask::batch_api::{BatchState, NewBatch, Readiness, RemoteBatch};
 use crate::ask::{AskError, BatchInterface};
 use crate::error::{Error, Result};
 use crate::report::forecast::money;
+use crate::text::words::counted;
 use darkqa_score::answers::record::Detail;
 
 /// Number of consecutive failed uploads or creations after which a model is stopped; chosen: 15 minutes by [`hold`](Driver::hold) with the
@@ -191,7 +192,7 @@ impl<D: Detail> Driver<'_, D> {
             }
             None => String::new(),
         };
-        let line = format!("batch {id} of {} requests{cost}", facts.requests);
+        let line = format!("batch {id} of {}{cost}", counted(facts.requests, "request"));
         self.say(part, &line);
         self.journal.record(part, Event::Created { id })?;
         // Wait before the first check.

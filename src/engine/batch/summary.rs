@@ -1,5 +1,6 @@
 //! The state of a run's parts as text: [`lines`].
 
+use crate::text::words::counted;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
@@ -13,9 +14,9 @@ pub(super) fn lines(journal: &Journal, states: &BTreeMap<String, String>) -> Str
         let batch = part.batch.as_deref().unwrap_or("no batch");
         let _ = writeln!(
             text,
-            "{}: {} requests to {}, {batch}, {}",
+            "{}: {} to {}, {batch}, {}",
             part.name,
-            part.facts.requests,
+            counted(part.facts.requests, "request"),
             part.facts.model,
             states
                 .get(&part.name)

@@ -8,6 +8,7 @@ use super::settings::{AskSettings, ModelSettings};
 use super::{endpoint, open};
 use crate::ask::{Message, Model};
 use crate::error::{Error, Result};
+use crate::text::words::counted;
 
 /// Lines about each model: its name, its endpoint, the source of its key, its request, and the digest that is part of its trial keys.
 ///
@@ -51,7 +52,11 @@ pub(crate) fn describe(ask: &AskSettings) -> Result<String> {
         }
         write_line(&mut text, "digest", &opened.digest()?.to_string()[..16]);
         if let Some(limit) = model.limit {
-            write_line(&mut text, "limit", &format!("the first {limit} questions"));
+            write_line(
+                &mut text,
+                "limit",
+                &format!("the first {}", counted(limit, "question")),
+            );
         }
     }
     Ok(text)

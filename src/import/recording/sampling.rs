@@ -78,10 +78,11 @@ impl SamplingArgs {
     /// Description of the choice.
     pub(crate) fn description(&self) -> String {
         let mut words = Vec::new();
-        if !self.at.is_empty() {
-            words.push(format!("at {} times", self.at.len()));
-        } else if self.interval() > 0.0 {
-            words.push(format!("one every {} s", self.interval()));
+        match self.at.len() {
+            0 if self.interval() > 0.0 => words.push(format!("one every {} s", self.interval())),
+            0 => {}
+            1 => words.push("at 1 time".to_owned()),
+            times => words.push(format!("at {times} times")),
         }
         if let Some(limit) = self.max_frames {
             words.push(format!("at most {limit}, evenly spread"));

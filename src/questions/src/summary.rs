@@ -109,9 +109,9 @@ pub struct Baselines {
     pub chance: f64,
     /// Number of right answers if every reply is the most common answer of the family.
     pub majority: usize,
-    /// Expected number of right answers if a model knows the answers in other scenes. It replies with the most common answer to the same
-    /// text. If no other scene has that text, it replies with the most common answer of the family; if no other scene has the family, it
-    /// guesses.
+    /// Expected number of right answers if a model knows the answers in other scenes. Among the choices of the question, it replies with
+    /// the most common answer to the same text. If no other scene has one of them for that text, it replies with the most common answer of
+    /// the family; if no other scene has one of them in the family, it guesses.
     pub prior: f64,
 }
 
@@ -360,6 +360,10 @@ fn prior(questions: &[&GeneratedQuestion]) -> f64 {
                 .get(text)
                 .into_iter()
                 .flatten()
+                .filter(|(answer, _)| {
+                    let choices = asked.question.choices.texts();
+                    choices.iter().any(|choice| choice == *answer)
+                })
                 .map(|(answer, scenes)| {
                     let count: usize = scenes
                         .iter()
@@ -378,4 +382,40 @@ fn prior(questions: &[&GeneratedQuestion]) -> f64 {
         }
     }
     right as f64 + expected_by_chance(&guesses)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use darkqa_ground::types::{Choices, FrameId, Question, QuestionId};
+
+    fn closest(scene: &str, choices: [&str; 2]) -> GeneratedQuestion {
+        GeneratedQuestion {
+            question: Question {
+                id: QuestionId(scene.to_owned()),
+                frame: FrameId(scene.to_owned()),
+                family: Family::Closest,
+                text: "Which object is closest?".to_owned(),
+                choices: Choices::new(choices.map(str::to_owned).to_vec(), 0).unwrap(),
+                group: None,
+                evidence: serde_json::Value::Null,
+            },
+            about: choices[0].to_owned(),
+            scene: scene.to_owned(),
+        }
+    }
+
+    #[test]
+    fn prior_replies_with_own_choices() {
+        let questions = [
+            closest("a", ["chair", "bed"]),
+            closest("b", ["chair", "bed"]),
+            closest("c", ["sofa", "lamp"]),
+            closest("d", ["sofa", "lamp"]),
+            closest("e", ["chair", "lamp"]),
+        ];
+        // In other scenes the chair is as common as the sofa, or more, but the questions about the sofa do not offer it.
+        let right = prior(&questions.iter().collect::<Vec<_>>());
+        assert!((right - 5.0).abs() < 1e-12, "{right}");
+    }
 }

@@ -11,7 +11,7 @@ use crate::error::Result;
 use crate::report::page::{OpenContent, page_of_open_questions};
 use crate::tables::Section;
 use crate::text::table::Table;
-use crate::text::words::{counted, percent, points};
+use crate::text::words::{counted, percent, plural, points};
 use crate::types::degradations::Axis;
 use darkqa_score::model_in_condition::ModelInCondition;
 use darkqa_score::open::{AnswerOutcome, Baseline, Group};
@@ -105,11 +105,11 @@ fn alerts(report: &OpenReport<'_>) -> Vec<String> {
         .iter()
         .filter(|answer| answer.outcome == AnswerOutcome::Unmarked)
         .count();
-    match unmarked {
-        0 => {}
-        n => alerts.push(format!(
-            "{n} answers are not scored: the judge's replies to them have no mark."
-        )),
+    if unmarked > 0 {
+        alerts.push(format!(
+            "{} not scored, because the judge gave no mark.",
+            plural(unmarked, "answer is", "answers are")
+        ));
     }
     if counts.answered < counts.trials {
         alerts.push(format!(
@@ -134,12 +134,12 @@ fn intro(report: &OpenReport<'_>) -> Vec<String> {
     let mut lines = vec![
         format!(
             "{} about {}. Score: 100 · mean((mark − 1) / 4), marks from 1 to 5 by {judge}, protocol {}. Intervals are \
-             95 %, by {} ({} clusters); differences are of unrounded means, on the questions that are scored in both.",
+             95 %, by {} ({}); differences are of unrounded means, on the questions that are scored in both.",
             counted(report.questions.len(), "question"),
             counted(walks.len(), "walk"),
             report.protocol,
             summary.unit,
-            summary.clusters
+            counted(summary.clusters, "cluster")
         ),
         coverage(report).join("; ") + ".",
     ];

@@ -8,7 +8,7 @@ use crate::text::table::ColumnKind::{Accuracy, Count, Points, Share, Text};
 use crate::text::table::SUMMARY;
 use crate::text::table::{ColumnKind, Table, TableBuilder, TableCell};
 use crate::text::terminal::texts;
-use crate::text::words::ends;
+use crate::text::words::{counted, ends};
 use crate::types::degradations::Axis;
 use darkqa_score::estimate::Estimate;
 use darkqa_score::open::{Baseline, Group, OpenCell, OpenSummary};
@@ -136,9 +136,9 @@ fn axis_table(report: &OpenReport<'_>, axis: Axis, ladder: &Ladder<'_, OpenCell>
         summary.clusters, summary.unit
     ));
     table.latex = Some(format!(
-        "OpenEQA by LLM-Match in \\%{of} (marked by {}, protocol {protocol}), with the difference from L0; {} questions.",
+        "OpenEQA by LLM-Match in \\%{of} (marked by {}, protocol {protocol}), with the difference from L0; {}.",
         escape(judge),
-        report.questions.len()
+        counted(report.questions.len(), "question")
     ));
     table
 }

@@ -221,21 +221,30 @@ fn compress(data: &PageData<'_>) -> std::io::Result<Vec<u8>> {
 pub(in crate::report) fn shortened(texts: &[&str], limit: usize) -> Vec<String> {
     let max_chars = MAX_REPLY_CHARS
         .into_iter()
-        .find(|max| texts.iter().map(|text| text.len().min(*max)).sum::<usize>() <= limit)
+        .find(|max| {
+            let bytes: usize = texts.iter().map(|text| cut(text, *max).len()).sum();
+            bytes <= limit
+        })
         .unwrap_or(MAX_REPLY_CHARS[MAX_REPLY_CHARS.len() - 1]);
     texts
         .iter()
-        .map(|text| match text.char_indices().nth(max_chars) {
-            None => (*text).to_owned(),
-            Some((end, _)) => {
-                let all = text.chars().count();
-                format!(
-                    "{} … [cut here after {max_chars} of {all} characters; records.jsonl has all]",
-                    &text[..end]
-                )
+        .map(|text| {
+            let short = cut(text, max_chars);
+            if short.len() == text.len() {
+                return short.to_owned();
             }
+            let all = text.chars().count();
+            format!(
+                "{short} … [cut here after {max_chars} of {all} characters; records.jsonl has all]"
+            )
         })
         .collect()
+}
+
+/// The first `max_chars` characters of a text.
+fn cut(text: &str, max_chars: usize) -> &str {
+    let end = text.char_indices().nth(max_chars);
+    end.map_or(text, |(end, _)| &text[..end])
 }
 
 /// Width and height of each frame in pixels; `None` if no thumbnail records them.
@@ -343,4 +352,18 @@ pub(in crate::report) fn thumbnails<'a>(
         by_index.insert(index, pictures);
     }
     by_index
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn reply_limit_counts_bytes() {
+        let reply = "é".repeat(15_000);
+        let [short] = &shortened(&[&reply], 20_000)[..] else {
+            panic!("one text expected");
+        };
+        assert!(short.len() < 20_000, "{}", short.len());
+    }
 }

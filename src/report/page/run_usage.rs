@@ -1,5 +1,6 @@
 //! Usage of a run: [`RunUsage`].
 
+use crate::text::words::counted;
 use std::collections::BTreeSet;
 
 use crate::types::{ChoiceDetail, TrialRef, Usage};
@@ -64,14 +65,16 @@ impl RunUsage {
             Some(latency) => latency.map(|ms| format!("{ms} ms")),
         };
         let served: Vec<&str> = self.served.iter().map(String::as_str).collect();
+        let trials = counted(self.trials, "trial");
         let rows = [
             (
                 "requests",
                 match self.built_in {
-                    0 => format!("{} for {} trials", self.requests, self.trials),
+                    0 => format!("{} for {trials}", self.requests),
                     built_in => format!(
-                        "{} for {} trials; {built_in} trials of built-in models took none",
-                        self.requests, self.trials
+                        "{} for {trials}; {} of built-in models took none",
+                        self.requests,
+                        counted(built_in, "trial")
                     ),
                 },
             ),
@@ -107,6 +110,18 @@ fn median_and_95(values: &mut [u32]) -> Option<[u64; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn one_trial_is_singular() {
+        let usage = RunUsage {
+            requests: 1,
+            trials: 1,
+            built_in: 1,
+            ..RunUsage::default()
+        };
+        let expected = "1 for 1 trial; 1 trial of built-in models took none";
+        assert_eq!(usage.facts()[0].1, expected);
+    }
 
     #[test]
     fn quantiles_ignore_the_order_of_values() {

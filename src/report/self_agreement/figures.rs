@@ -5,6 +5,7 @@ use crate::drawing::chart::{Chart, Figure, LineContent, LineStyle, Panel, PlotLi
 use crate::drawing::paper::figure;
 use crate::error::Result;
 use crate::text::ladder::{Ladder, Series, SeriesByLevel};
+use crate::text::words::counted;
 use crate::types::AxisLevel;
 use darkqa_score::comparisons::self_agreement::SelfAgreement;
 use darkqa_score::comparisons::self_agreement::cell::{AgreementCell, CellRole};
@@ -20,9 +21,9 @@ pub(super) fn figures(found: &SelfAgreement<'_>) -> Result<Vec<Figure>> {
         return Ok(Vec::new());
     }
     let note = format!(
-        "n = {} items in {} {unit}s; bands and bars are 95 % intervals by {unit}; strict parsing",
-        found.items(),
-        found.grid.clusters,
+        "n = {} in {}; bands and bars are 95 % intervals by {unit}; strict parsing",
+        counted(found.items(), "item"),
+        counted(found.grid.clusters, &found.unit.to_string()),
         unit = found.unit
     );
     let agreement = panels(

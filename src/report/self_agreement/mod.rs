@@ -65,12 +65,12 @@ pub(crate) fn products<'a>(
 fn intro(found: &SelfAgreement<'_>) -> Vec<String> {
     let unit = found.unit;
     let facts = format!(
-        "Nobody knows the true answers to these questions. Each model is compared with its own answers at L0: {}, {} subjects (model × \
-         condition). Strict parsing. Intervals are 95 %, by {unit} ({} clusters); differences are paired by item, tested by swapping whole \
+        "Nobody knows the true answers to these questions. Each model is compared with its own answers at L0: {}, {} (model × \
+         condition). Strict parsing. Intervals are 95 %, by {unit} ({}); differences are paired by item, tested by swapping whole \
          {unit}s, and corrected by Holm over the comparisons of one kind and model.",
         counted(found.items(), "item"),
-        found.grid.subjects.len(),
-        found.grid.clusters
+        counted(found.grid.subjects.len(), "subject"),
+        counted(found.grid.clusters, "cluster")
     );
     let readings = NoiseProfiles::new(&found.grid.subjects);
     std::iter::once(facts)

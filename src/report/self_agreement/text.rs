@@ -12,7 +12,7 @@ use crate::report::report_length::ReportLength;
 use crate::report::short::findings::findings;
 use crate::text::noise_profiles::NoiseProfiles;
 use crate::text::terminal::{render, table};
-use crate::text::words::counted;
+use crate::text::words::{counted, plural};
 use crate::text::wrapped::wrapped;
 use crate::types::manifests::RunManifest;
 use darkqa_score::accuracies::Health;
@@ -67,9 +67,10 @@ pub(super) fn head(report: &AgreementReport<'_>) -> String {
     let replies: usize = found.health.iter().map(|health| health.replies).sum();
     let failed: usize = found.health.iter().map(Health::failures).sum();
     format!(
-        "{who} · {} without answers · {} · {replies} replies, {failed} failed · intervals by {}",
+        "{who} · {} without answers · {} · {}, {failed} failed · intervals by {}",
         counted(questions.len(), "question"),
         counted(frames.len(), "image"),
+        plural(replies, "reply", "replies"),
         found.unit
     )
 }

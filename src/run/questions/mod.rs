@@ -25,6 +25,7 @@ use crate::report::questions::against::AppearanceComparison;
 use crate::runs::Outcome;
 use crate::runs::shard::Shard;
 use crate::runs::shard_args::{keep_shard, shard_from_flag};
+use crate::text::words::{counted, plural};
 use crate::types::shell_word;
 use crate::types::{Decides, Digest, Family, FrameId, Labels, QuestionId};
 use darkqa_questions::balance::BalanceMode;
@@ -278,7 +279,8 @@ fn warn(generated: &Generated, settings: &QuestionSettings<'_>) {
     if let Some(frames) = scale {
         let measure = &settings.rules.book().measure;
         tracing::warn!(
-            "{frames} frames have a median depth outside {}–{} mm, which no room has, so no questions about depth are made; is their depth_scale right?",
+            "{} a median depth outside {}–{} mm, which no room has, so no questions about depth are made; is their depth_scale right?",
+            plural(*frames as usize, "frame has", "frames have"),
             measure.least_median_depth_mm,
             measure.most_median_depth_mm
         );
@@ -290,8 +292,9 @@ fn shard_outcome(args: &QuestionsArgs, shard: Shard, frames: usize, failed: usiz
     let path = statistics_path(&args.out, shard);
     let status = Outcome::complete_if(failed == 0);
     let output = format!(
-        "{}: statistics of {frames} frames; the same command without --shard makes the questions from those of all parts\n",
-        path.display()
+        "{}: statistics of {}; the same command without --shard makes the questions from those of all parts\n",
+        path.display(),
+        counted(frames, "frame")
     );
     Outcome::wrote(path, status, output)
 }

@@ -14,7 +14,7 @@ use crate::report::study::{StudyImage, StudyQuestion, page};
 use crate::runs::Outcome;
 use crate::runs::image_rebuilder::{ImageRebuilder, RebuildArgs};
 use crate::runs::stored::StoredRun;
-use crate::text::words::counted;
+use crate::text::words::{counted, plural};
 use crate::types::manifests::Status;
 use crate::types::{
     ChoiceDetail, Condition, Decides, Digest, FrameId, QuestionId, RunQuestion, Trials,
@@ -123,12 +123,12 @@ pub(crate) fn pack(args: PackArgs, progress: &Progress) -> Result<Outcome> {
         &path,
         Status::Complete,
         format!(
-            "{}: {}, {}, {}; with {} people each image is seen by one of them\n",
+            "{}: {}, {}, {}; with {} each image is seen by one of them\n",
             path.display(),
             counted(asked.len(), "question"),
             counted(images, "image"),
             counted(conditions.len(), "condition"),
-            conditions.len()
+            plural(conditions.len(), "person", "people")
         ),
     ))
 }

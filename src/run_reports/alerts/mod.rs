@@ -24,7 +24,7 @@ use crate::runs::over_budget::OverBudget;
 use crate::text::alert::{Alert, AlertKind};
 use crate::text::words::{counted, plural};
 use crate::types::manifests::Status;
-use crate::types::{FrameId, InputSummary};
+use crate::types::{FrameId, InputSummary, OpenDetail, StoredDetail as _};
 use darkqa_score::answers::record::Detail;
 use darkqa_score::cluster::{ClusterUnit, MIN_SCENES};
 use darkqa_score::comparisons::compares_models;
@@ -255,16 +255,24 @@ fn progress_alerts(runs: &[JoinedRun]) -> Vec<Alert> {
         .filter(|run| run.manifest.status != Status::Complete)
         .map(|run| {
             let (status, counts) = (run.manifest.status, run.manifest.counts);
-            // A merge of only some shards is not complete, but has no trials left to ask.
-            let rest = if counts.answered < counts.trials {
-                " The same command asks the rest."
+            let text = if counts.answered < counts.trials {
+                format!(
+                    "{}: {status}: {} of {} trials answered, {} failed. The same command asks the rest.",
+                    run.name, counts.answered, counts.trials, counts.failed
+                )
             } else {
-                ""
+                let rest = match status {
+                    Status::Incomplete if run.manifest.schema == OpenDetail::SCHEMA => {
+                        ", but shards are missing, or marks of the judge could not be read."
+                    }
+                    Status::Incomplete => ", but shards are missing.",
+                    _ => ". The same command completes the run.",
+                };
+                format!(
+                    "{}: {status}: all {} trials are answered{rest}",
+                    run.name, counts.trials
+                )
             };
-            let text = format!(
-                "{}: {status}: {} of {} trials answered, {} failed.{rest}",
-                run.name, counts.answered, counts.trials, counts.failed
-            );
             Alert::new(AlertKind::NotComplete, text)
         })
         .collect()

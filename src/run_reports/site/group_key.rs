@@ -11,6 +11,7 @@ use crate::run_reports::settings::{
 };
 use crate::runs::mark_index::{JUDGE, PROTOCOL};
 use crate::runs::stored::{StoredRun, text_setting};
+use crate::text::words::counted;
 use crate::types::manifests::RunManifest;
 use crate::types::{AxisLevel, Digest, OpenDetail, RunQuestion, Variant};
 
@@ -140,7 +141,8 @@ impl GroupKey {
         let light = Digest::canonical("darkqa.site-light/1", &light)?.to_string();
         let data = identity_settings(manifest).get("--data").cloned();
         self.title = format!(
-            "{questions} questions{}, {title_end}",
+            "{}{}, {title_end}",
+            counted(questions, "question"),
             data.map_or_else(String::new, |data| format!(" of {}", shorten(&data)))
         );
         self.digests = GroupDigests {

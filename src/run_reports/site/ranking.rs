@@ -6,6 +6,7 @@ use std::fmt::Write;
 use super::choice_member::ChoiceMember;
 use crate::report::site::{ChoiceRow, GroupRows, Ranking};
 use crate::run_reports::combine::clusters;
+use crate::text::words::plural;
 use crate::types::{ChoiceDetail, ModelListing, RunQuestion, Trials};
 use darkqa_score::choice::ParsingMode;
 use darkqa_score::comparisons::{BestInTheDark, best_in_the_dark, rank_ranges};
@@ -93,7 +94,7 @@ fn words(best: Option<&BestInTheDark>, models: usize, unit: &str) -> String {
     };
     let levels = best.levels.iter().map(ToString::to_string);
     let mut words = format!(
-        "Ranks are by mean accuracy over the dark levels (L3 and darker: {}), on the {} items that {} models answered at all levels \
+        "Ranks are by mean accuracy over the dark levels ({}), on the {} items that {} models answered at all levels \
          from L0 ({} {unit}s), corrected by Holm over {}.",
         levels.collect::<Vec<_>>().join(", "),
         best.items,
@@ -115,15 +116,10 @@ fn words(best: Option<&BestInTheDark>, models: usize, unit: &str) -> String {
         );
     }
     if !best.without.is_empty() {
-        let ends = if best.without.len() == 1 {
-            " is"
-        } else {
-            "s are"
-        };
+        let models = plural(best.without.len(), "model is", "models are");
         let _ = write!(
             words,
-            " {} model{ends} not ranked: not asked at L0 and at a darker level.",
-            best.without.len()
+            " {models} not ranked: fewer answers at these levels."
         );
     }
     if !best.is_possible() {

@@ -5,6 +5,7 @@ use super::stored_shard::StoredShard;
 use crate::error::{Error, Result};
 use crate::runs::run_plan::RunPlan;
 use crate::runs::shard::Shard;
+use crate::text::words::counted;
 use crate::types::manifests::Status;
 
 /// Treatment of sources of a run that are in no shard.
@@ -57,10 +58,10 @@ pub(super) fn check(
     };
     let counts = plan.map_or_else(String::new, |plan| {
         format!(
-            " ({} of {} frames, {} trials)",
+            " ({} of {} frames, {})",
             coverage.gaps().count(),
             coverage.sources(),
-            plan.request_count(coverage.gaps())
+            counted(plan.request_count(coverage.gaps()), "trial")
         )
     });
     match missing {

@@ -250,6 +250,34 @@ fn the_best_is_shown_better_than_every_other() {
 }
 
 #[test]
+fn crossing_is_corrected_for_model_pairs() {
+    let mut all = [
+        records("bright", "L0", |_| Some(true)),
+        records("bright", "L5-noise", |item| Some(item < 4)),
+        records("steady", "L0", |item| Some(item % 4 < 2)),
+        records("steady", "L5-noise", |item| Some(item % 4 < 2)),
+    ]
+    .concat();
+    let two = crossing_p(&all);
+    all.extend(records("weak", "L0", |item| Some(item < 8)));
+    all.extend(records("weak", "L5-noise", |_| Some(false)));
+    // Three models have three pairs.
+    let three = crossing_p(&all);
+    assert!((three - 3.0 * two).abs() < 1e-12, "{two} {three}");
+}
+
+/// The p-value of the change of order from `bright` to `steady`.
+fn crossing_p(records: &[Record]) -> f64 {
+    with_grid(records, |grid| {
+        let best = best_in_the_dark(grid, ParsingMode::Strict).unwrap();
+        let crossing = best.crossing.unwrap();
+        assert_eq!(crossing.before.0, "bright");
+        assert_eq!(crossing.after.0, "steady");
+        crossing.p
+    })
+}
+
+#[test]
 fn below_blind_is_what_the_corrected_test_shows() {
     let records = [
         records("m", "", |item| Some(item != 3)),

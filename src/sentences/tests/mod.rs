@@ -1,6 +1,7 @@
 //! Expected sentences of each kind and verdict. Every number in a sentence must be one of its values ([`checked`]).
 
 mod below_blind;
+mod best;
 mod confidence;
 mod hallucination;
 mod records;

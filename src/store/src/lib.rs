@@ -319,7 +319,7 @@ impl<D: Detail> Store<D> {
             );
         } else if !lost.is_empty() {
             tracing::warn!(
-                "{}: {} questions of records were missing; made again from the data",
+                "{}: questions of records were missing ({}); made again from the data",
                 path.display(),
                 lost.len()
             );

@@ -223,7 +223,7 @@ fn findings_are_listed_per_profile() {
         ["open", "under some"]
     );
     for part in [
-        "Does each finding hold under every reading?",
+        "Does each finding hold under every noise profile?",
         "2 of 2 findings about noise hold under all 3 noise profiles",
         "Noise compounds the drop: holds under paper, eld, physical.",
         "the break (threshold EV)",

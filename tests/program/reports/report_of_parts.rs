@@ -126,7 +126,7 @@ fn missing_shards_name_their_command() {
     let command = command.split(" asks what is left").next().unwrap();
     insta::assert_snapshot!(reported.lines_with("incomplete"), @"
     exit code: 0
-    ! a: incomplete: 75 of 75 trials answered, 0 failed.
+    ! a: incomplete: all 75 trials are answered, but shards are missing.
     ");
     let before = fs::read(bench.path("a/summary.csv")).unwrap();
     let partial = bench.call(&words("merge a --out partial/a --partial"));

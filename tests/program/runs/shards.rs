@@ -115,7 +115,7 @@ fn missing_and_foreign_shards_are_named() {
     let partial = bench.call(&["merge", "parts", "--out", "m", "--partial"]);
     insta::assert_snapshot!(partial.lines_with("incomplete"), @"
     exit code: 1
-    ! m: incomplete: 48 of 48 trials answered, 0 failed.
+    ! m: incomplete: all 48 trials are answered, but shards are missing.
     ");
     bench.complete(&args("--out other --shard 2/3 --seed 9"));
     refused("parts other --out n", "is of another run than");

@@ -131,7 +131,8 @@ pub struct Crossing {
     pub lead: Estimate,
     /// Mean accuracy of the `before` model minus the `after` model, over the levels after the change of order.
     pub lag: Estimate,
-    /// Larger p-value of `lead` and `lag`, times the number of gaps between levels (Bonferroni over the possible places of the change).
+    /// Larger p-value of `lead` and `lag`, times the number of gaps between levels and the number of pairs of models (Bonferroni over the
+    /// possible places of the change and the pairs that could have led).
     pub p: f64,
     /// `p` after the correction over all tests that the report's sentences use; `None` before that correction.
     pub p_report: Option<f64>,
@@ -497,13 +498,14 @@ impl Scores {
             self.test_pair(pair, 0..split),
             self.test_pair(pair, split..self.levels),
         );
-        let gaps = (self.levels - 1) as f64;
+        let gaps = self.levels - 1;
+        let pairs = models.len() * (models.len() - 1) / 2;
         Some(Crossing {
             before: (light.model.clone(), levels[split - 1]),
             after: (dark.model.clone(), levels[split]),
             lead: lead.difference,
             lag: lag.difference,
-            p: (gaps * lead.p.max(lag.p)).min(1.0),
+            p: ((gaps * pairs) as f64 * lead.p.max(lag.p)).min(1.0),
             p_report: None,
         })
     }

@@ -154,7 +154,7 @@ impl PairDarkness {
         }
         if self.unknown > 0 {
             all.push(format!(
-                "{} frames or their photographs {name} are black, so that their drop is not known.",
+                "Photographs {name} whose drop is not known, because they or their frames are black: {}.",
                 self.unknown
             ));
         }

@@ -116,7 +116,7 @@ fn foreign_noise_is_not_fitted() {
     ");
     let refused = "bare, physical: K 0.02, misfit";
     assert!(table.contains(refused), "{table}");
-    let reason = "no fit, as the ladder of K ends here: the low image's noise is not a sensor's under this reading";
+    let reason = "no fit, as the ladder of K ends here: the low image's noise is not a sensor's under this noise profile";
     assert!(table.contains(reason), "{table}");
     let rows = csv(&bench, "out/fits.csv");
     assert_eq!(column(&rows, "pair"), ["averaged", "bare"]);

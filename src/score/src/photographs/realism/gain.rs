@@ -139,9 +139,9 @@ impl fmt::Display for FitOutcome {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(match self {
             Self::Fitted => "fitted",
-            Self::Misfit => "no fit: the low image's noise is not a sensor's under this reading",
+            Self::Misfit => "no fit: the low image's noise is not a sensor's under this noise profile",
             Self::EndOfLadder => {
-                "no fit, as the ladder of K ends here: the low image's noise is not a sensor's under this reading"
+                "no fit, as the ladder of K ends here: the low image's noise is not a sensor's under this noise profile"
             }
             Self::FewBlocks => "no fit: too few blocks of 8 × 8 pixels are smooth, and neither black nor white",
         })

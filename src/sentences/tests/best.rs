@@ -1,0 +1,74 @@
+//! Tests of the sentence about the best model in the dark, on synthetic records.
+
+use super::records::{SEEING, of_kind, scripted, sentences_about, wordy};
+
+#[test]
+fn format_changes_do_not_decide_the_best_model() {
+    let mut records = [scripted("a", &SEEING), scripted("b", &SEEING)].concat();
+    let split = records.len() / 2;
+    wordy(&mut records[split..], "L5-noise");
+    let best = of_kind(&sentences_about(&records), "best");
+    assert!(
+        best[0].starts_with("· a has the highest mean accuracy"),
+        "{best:?}"
+    );
+    assert!(
+        best[0].contains("detected in the strict parsing alone"),
+        "{best:?}"
+    );
+}
+
+#[test]
+fn best_model_is_chosen_at_dark_levels() {
+    let bright = scripted("bright", &at_noise_levels([99, 97, 97, 45, 35, 35]));
+    let steady = scripted("steady", &at_noise_levels([62, 58, 59, 61, 50, 51]));
+    let two = [bright.clone(), steady.clone()].concat();
+    let best = of_kind(&sentences_about(&two), "best");
+    assert!(
+        best[0].starts_with("· bright is better to L2, steady from L3. (steady over L3–L5: "),
+        "{best:?}"
+    );
+    // A third model that is worse everywhere changes nothing.
+    let third = scripted("third", &at_noise_levels([40, 40, 40, 34, 30, 28]));
+    let best = of_kind(&sentences_about(&[two, third].concat()), "best");
+    assert!(
+        best[0].starts_with("· bright is better to L2, steady from L3. ("),
+        "{best:?}"
+    );
+    // Without a change of order the best at L3 to L5 is named, not the best of all levels.
+    let even = scripted("even", &at_noise_levels([62, 62, 62, 30, 25, 25]));
+    let best = of_kind(&sentences_about(&[steady, even].concat()), "best");
+    assert!(
+        best[0].starts_with("+ steady sees best in the dark (L3–L5). ("),
+        "{best:?}"
+    );
+}
+
+#[test]
+fn change_of_leader_is_detected_in_both_parsings() {
+    let bright = scripted("bright", &at_noise_levels([99, 97, 97, 45, 35, 35]));
+    let steady = scripted("steady", &at_noise_levels([62, 58, 59, 61, 50, 51]));
+    let mut wordy_model = scripted("wordy", &at_noise_levels([40, 40, 40, 61, 50, 51]));
+    for condition in ["L3-noise", "L4-noise", "L5-noise"] {
+        wordy(&mut wordy_model, condition);
+    }
+    let best = of_kind(
+        &sentences_about(&[bright, steady, wordy_model].concat()),
+        "best",
+    );
+    assert!(
+        best[0].starts_with("· bright is better to L2, steady from L3. ("),
+        "{best:?}"
+    );
+    assert!(!best[0].contains("strict parsing alone"), "{best:?}");
+}
+
+/// L0 to L5 with noise, each with a percentage of right replies.
+fn at_noise_levels(percents: [usize; 6]) -> Vec<(&'static str, usize)> {
+    [
+        "L0", "L1-noise", "L2-noise", "L3-noise", "L4-noise", "L5-noise",
+    ]
+    .into_iter()
+    .zip(percents)
+    .collect()
+}
