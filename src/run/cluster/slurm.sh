@@ -29,6 +29,7 @@ if [ -z "${SLURM_JOB_ID:-}" ]; then
     before=$word
   done
   [ -n "$out" ] || { echo "$0: --out DIR is missing: the tasks share the folder of the run" >&2; exit 2; }
+  [ "$parts" -ge 2 ] || { echo "$0: PARTS must be 2 or more: a run in one part needs neither plan nor merge" >&2; exit 2; }
   submit() { sbatch --parsable --kill-on-invalid-dep=yes "$@"; }
   plan=$(submit --job-name=darkqa-plan "$0" plan "$@")
   array=$(submit --array="0-$((parts - 1))%$at_once" --output=darkqa-%A_%a.log --dependency="afterok:$plan" \

@@ -247,7 +247,7 @@ fn script_applies_steps_in_order() {
 
 /// The script of Slurm on a login node, with an `sbatch` that writes down what it is told; its code and these lines.
 #[cfg(unix)]
-fn sbatch(words: &[&str]) -> (Option<i32>, Vec<String>) {
+fn sbatch(parts: &str, words: &[&str]) -> (Option<i32>, Vec<String>) {
     use std::os::unix::fs::PermissionsExt as _;
 
     let bench = Bench::new();
@@ -262,7 +262,7 @@ fn sbatch(words: &[&str]) -> (Option<i32>, Vec<String>) {
         .args(words)
         .env("PATH", search)
         .env("TOLD", bench.path("told"))
-        .env("PARTS", "12")
+        .env("PARTS", parts)
         .env("AT_ONCE", "3")
         .env_remove("SLURM_JOB_ID")
         .output()
@@ -280,7 +280,7 @@ fn slurm_script_submits_three_jobs() {
     for out in ["--out runs/a", "--out=runs/a"] {
         let line = format!("{out} {flags}");
         let words: Vec<&str> = line.split(' ').collect();
-        let (code, told) = sbatch(&words);
+        let (code, told) = sbatch("12", &words);
         assert_eq!(code, Some(0), "{told:?}");
         let calls: Vec<(&str, &str)> = told
             .iter()
@@ -302,8 +302,13 @@ fn slurm_script_submits_three_jobs() {
             parse(&words);
         }
     }
-    let (code, told) = sbatch(&["--model", "gpt-4o"]);
-    assert_eq!((code, told.len()), (Some(2), 0));
+    for (parts, words) in [
+        ("12", &["--model", "gpt-4o"][..]),
+        ("1", &["--out", "runs/a", "--model", "gpt-4o"]),
+    ] {
+        let (code, told) = sbatch(parts, words);
+        assert_eq!((code, told.len()), (Some(2), 0), "{words:?}");
+    }
 }
 
 /// The lines in the heads of the scripts and on the page of clusters that start the script of Slurm.
