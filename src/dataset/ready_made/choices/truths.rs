@@ -142,7 +142,7 @@ fn are_texts(table: &Table, column: &Column) -> bool {
 /// Pairs each item with its answer. Items without an answer, or with several, are added to the omissions.
 ///
 /// # Errors
-/// If no item has an answer. The error suggests `other_column_flag`, the flag to read another column, if there is one.
+/// If the column has no answer in any row. The error suggests `other_column_flag`, the flag to read another column, if there is one.
 fn with_answers(
     table: &Table,
     column: &Column,
@@ -150,9 +150,8 @@ fn with_answers(
     omissions: &mut Omissions,
     other_column_flag: Option<String>,
 ) -> Result<Vec<(Item, String)>, String> {
-    let count = items.len();
     let mut absent = Vec::new();
-    let mut found = Vec::with_capacity(count);
+    let mut found = Vec::with_capacity(items.len());
     for item in items {
         match AnswerCell::from_row(&table.rows[item.row], column) {
             AnswerCell::One(answer) => found.push((item, answer)),
@@ -162,7 +161,11 @@ fn with_answers(
             AnswerCell::Absent => absent.push(item.row),
         }
     }
-    if absent.len() == count && count > 0 {
+    if table
+        .rows
+        .iter()
+        .all(|row| AnswerCell::from_row(row, column) == AnswerCell::Absent)
+    {
         let remedy = other_column_flag.map_or_else(
             || "a test split without them? --read split names another, and --ask FILE asks questions without answers about every image".to_owned(),
             |flag| format!("{flag} reads those of another column"),
@@ -195,6 +198,9 @@ fn add_choice_questions(
     let column = answer_column::option_column(table, roles, &items)?;
     let other_column_flag = answer_column::suggest_column(table, roles, &items);
     let items = with_answers(table, column, items, omissions, other_column_flag)?;
+    if items.is_empty() {
+        return Ok(());
+    }
     let column_format = ColumnFormat::choose(table, column, format, &items)?;
     let name = column_format.format.name();
     truths.columns.push(format!("{} ({name})", column.name));
