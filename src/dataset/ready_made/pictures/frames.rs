@@ -387,12 +387,10 @@ fn explain_non_path(text: &str, problem: String) -> String {
             .chars()
             .all(|c| c.is_ascii_alphanumeric() || "+/=-_".contains(c) || c.is_whitespace());
     if text.starts_with("data:") || is_long {
-        format!(
-            "its image is base64 that is cut or damaged ({length} characters, {start:?}); --skip bad leaves such rows out"
-        )
+        format!("its image is base64 that is cut or damaged ({length} characters, {start:?})")
     } else if length > MAX_PATH_LENGTH {
         format!(
-            "its image is a text of {length} characters, {start:?}, which is neither base64 nor a path of a file; --skip bad leaves such rows out"
+            "its image is a text of {length} characters, {start:?}, which is neither base64 nor a path of a file"
         )
     } else {
         problem

@@ -160,6 +160,18 @@ fn unusable_images_are_left_out_with_skip_bad() {
         "{problem}"
     );
     assert!(problem.len() < 400, "{problem}");
+    assert!(problem.ends_with("; --skip bad leaves such rows out"));
+}
+
+#[test]
+fn skip_bad_is_not_advised_twice() {
+    let (_folder, path) = set("set.tsv", &[question(1, &"QUJD".repeat(2000)[1..])]);
+    let skip = SetArgs {
+        bad: Some(crate::dataset::SkipBad::default()),
+        ..SetArgs::default()
+    };
+    let problem = refusal(&path, &skip);
+    assert!(!problem.contains("leaves such rows out"), "{problem}");
 }
 
 fn by_index(index: u8) -> Map<String, Value> {
