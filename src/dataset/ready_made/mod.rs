@@ -78,6 +78,10 @@ pub(super) fn open(places: &[PathBuf], stem: &str, args: &SetArgs) -> Result<Rea
     allowed_roots.extend(further);
     let root = Root::new(&folder, &allowed_roots)?;
     let files: Vec<Arc<SetFile>> = files.into_iter().map(Arc::new).collect();
+    let place = match &*files {
+        [file] => file.label.path.as_path(),
+        _ => place,
+    };
     let mut table = read_files(&files, joined, args)?;
     table.parse_cells(info.map.iter().chain(&args.map));
     let hint = match args.preset {
@@ -376,7 +380,12 @@ fn omit_unusable_images(
     questions.retain(|question| match frames.problem(question.row) {
         None => true,
         Some(problem) => {
-            omissions.add(OmissionReason::Bad, || problem.to_string());
+            omissions.add(OmissionReason::Bad, || match problem {
+                Error::Data { problem, .. } => {
+                    format!("{}: {problem}", context.table.place_in_set(question.row))
+                }
+                other => other.to_string(),
+            });
             false
         }
     });

@@ -34,8 +34,8 @@ fn ambiguous_answers_need_a_mapping() {
     let called = run("");
     insta::assert_snapshot!(called.messages(), @r#"
     exit code: 2
-    error: set.json: set.json, object 1: the answer "1" may be read as index0 or as index1, which differ among the
-        options ["x", "y", "z"]; --map answer=answer:index0 or --map answer=answer:index1 says which is meant
+    error: set.json: object 1: the answer "1" may be read as index0 or as index1, which differ among the options
+        ["x", "y", "z"]; --map answer=answer:index0 or --map answer=answer:index1 says which is meant
     "#);
     let called = run("--map answer=answer:index1");
     insta::assert_snapshot!(called.messages(), @r#"
@@ -333,8 +333,8 @@ fn answer_outside_options_is_refused() {
     let refused = bench.call(&words("--data data --model random"));
     insta::assert_snapshot!(refused.messages(), @r#"
     exit code: 2
-    error: data/questions.jsonl: 1 of 2 rows are broken; the first: data/questions.jsonl, line 2: the answer "A"
-        is not one of the options ["yes", "no"] (read as text, which fits 1 rows); --skip bad=50% leaves it out
+    error: data/questions.jsonl: 1 of 2 rows are broken; the first: line 2: the answer "A" is not one of the
+        options ["yes", "no"] (read as text, which fits 1 rows); --skip bad=50% leaves it out
     "#);
 }
 

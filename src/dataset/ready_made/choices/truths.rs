@@ -51,7 +51,10 @@ pub(in crate::dataset::ready_made) fn find_truths(
     if roles.answers.is_empty() && items.iter().all(|item| item.options.is_none()) {
         for item in items {
             omissions.add(OmissionReason::Open, || {
-                format!("not in a column that is known ({})", table.place(item.row))
+                format!(
+                    "not in a column that is known ({})",
+                    table.place_in_set(item.row)
+                )
             });
         }
         return Ok(Truths::default());
@@ -177,7 +180,11 @@ fn with_answers(
     }
     for row in absent {
         omissions.add(OmissionReason::Bad, || {
-            format!("{}: no answer (column {:?})", table.place(row), column.name)
+            format!(
+                "{}: no answer (column {:?})",
+                table.place_in_set(row),
+                column.name
+            )
         });
     }
     Ok(found)
@@ -212,7 +219,7 @@ fn add_choice_questions(
         match column_format.choices(&answer, &options.unwrap_or_default()) {
             Ok(choices) => truths.questions.push(ParsedQuestion { row, text, choices }),
             Err(problem) => omissions.add(OmissionReason::Bad, || {
-                format!("{}: {problem}", table.place(row))
+                format!("{}: {problem}", table.place_in_set(row))
             }),
         }
     }
@@ -267,7 +274,7 @@ impl ColumnFormat {
         match items.first() {
             Some((item, answer)) if chosen.fitting_rows == 0 => Err(format!(
                 "{}: the answer {:?} (column {:?}) is not one of the options {}, neither by letter nor by text nor by number",
-                table.place(item.row),
+                table.place_in_set(item.row),
                 excerpt(answer, 60),
                 column.name,
                 rows[0].options.excerpt(120)
@@ -358,7 +365,7 @@ fn ambiguous_answer(
         formats.map(|format| map_flag(Role::Answer, &column.name, Some(format)));
     format!(
         "{}: the answer {:?} may be read as {one} or as {other}, which differ among the options {}; {one_flag} or {other_flag} says which is meant",
-        table.place(item.row),
+        table.place_in_set(item.row),
         excerpt(answer, 60),
         options.excerpt(120),
     )

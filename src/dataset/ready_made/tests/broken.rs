@@ -174,6 +174,25 @@ fn skip_bad_is_not_advised_twice() {
     assert!(!problem.contains("leaves such rows out"), "{problem}");
 }
 
+#[test]
+fn message_names_the_file_once() {
+    let broken = question(1, "none.png");
+    let other = row(
+        json!({"id": 2, "question": "?", "options": ["x", "y"], "answer": "z", "image": base64(1)}),
+    );
+    let skip = SetArgs {
+        bad: Some(crate::dataset::SkipBad::default()),
+        ..SetArgs::default()
+    };
+    for bad in [broken, other] {
+        let (folder, path) = set("set.json", &[question(3, &base64(2)), bad]);
+        for place in [&path, folder.path()] {
+            let problem = refusal(place, &skip);
+            assert_eq!(problem.matches("set.json").count(), 1, "{problem}");
+        }
+    }
+}
+
 fn by_index(index: u8) -> Map<String, Value> {
     row(
         json!({"id": index, "question": "?", "options": ["x", "y"], "correct_choice_idx": index, "image": base64(1 + index)}),
