@@ -70,7 +70,10 @@ pub(super) fn read_lines(path: &Path, table: &mut Table) -> Result<()> {
         if !bytes.trim_ascii().is_empty() {
             check_values(bytes).map_err(|problem| Error::line(path, number, problem))?;
             let value =
-                serde_json::from_slice(bytes).map_err(|e| Error::json_line(path, number, &e))?;
+                serde_json::from_slice(bytes).map_err(|e| match nan_problem(bytes, &e) {
+                    Some(problem) => Error::line(path, number, problem),
+                    None => Error::json_line(path, number, &e),
+                })?;
             let Value::Object(fields) = value else {
                 return Err(Error::line(
                     path,
@@ -193,11 +196,23 @@ fn parse_object(value: &JsonValue, number: u64) -> Result<Map<String, Value>, St
     match serde_json::from_slice(&value.bytes) {
         Ok(Value::Object(fields)) => Ok(fields),
         Ok(_) => Err(format!("value {number} of the list is not an object")),
-        Err(e) => Err(format!(
-            "object {number}, at byte {}: {e}",
-            value.offset + 1
-        )),
+        Err(e) => match nan_problem(&value.bytes, &e) {
+            Some(problem) => Err(format!("object {number}: {problem}")),
+            None => Err(format!(
+                "object {number}, at byte {}: {e}",
+                value.offset + 1
+            )),
+        },
     }
+}
+
+/// Error message for a row that is not JSON because of a `NaN` or `Infinity`, as Python writes them; `None` for other faults.
+fn nan_problem(bytes: &[u8], error: &serde_json::Error) -> Option<&'static str> {
+    let line = bytes.split(|byte| *byte == b'\n').nth(error.line() - 1)?;
+    let rest = line.get(error.column().saturating_sub(1)..)?;
+    let rest = rest.strip_prefix(b"-").unwrap_or(rest);
+    (rest.starts_with(b"NaN") || rest.starts_with(b"Infinity"))
+        .then_some("NaN or Infinity, which JSON does not have; write null in its place")
 }
 
 /// Appends the rows of an object whose fields are the rows by id.

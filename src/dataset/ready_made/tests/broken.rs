@@ -193,6 +193,19 @@ fn message_names_the_file_once() {
     }
 }
 
+#[test]
+fn nan_in_json_is_named() {
+    for name in ["set.jsonl", "set.json"] {
+        for number in ["NaN", "-Infinity"] {
+            let (_folder, path) = set(name, &[question(7, "a.png")]);
+            let text = std::fs::read_to_string(&path).unwrap();
+            std::fs::write(&path, text.replace('7', number)).unwrap();
+            let problem = refusal(&path, &SetArgs::default());
+            assert!(problem.contains("write null"), "{problem}");
+        }
+    }
+}
+
 fn by_index(index: u8) -> Map<String, Value> {
     row(
         json!({"id": index, "question": "?", "options": ["x", "y"], "correct_choice_idx": index, "image": base64(1 + index)}),
