@@ -10,8 +10,8 @@ use super::super::cells::{Cell, RowPlace, Table};
 use crate::error::{Error, Result};
 use crate::files::reading;
 
-/// Returns the delimiter of a table: a tab for the ending `tsv`; otherwise a comma, or a semicolon if the header has semicolons but no
-/// commas, as spreadsheets write it in many countries.
+/// Returns the delimiter of a table: a tab for the ending `tsv`; otherwise a comma, or, if the header has none, a semicolon or tab that
+/// it has. Spreadsheets write semicolons in many countries.
 pub(super) fn delimiter(path: &Path, ending: &str) -> Result<u8> {
     if ending == "tsv" {
         return Ok(b'\t');
@@ -21,8 +21,10 @@ pub(super) fn delimiter(path: &Path, ending: &str) -> Result<u8> {
     let mut file = BufReader::new(file.take(MAX_RECORD_BYTES));
     file.read_until(b'\n', &mut header)
         .map_err(|e| Error::file(path, "read", e))?;
-    let is_comma = header.contains(&b',') || !header.contains(&b';');
-    Ok(if is_comma { b',' } else { b';' })
+    Ok([b',', b';', b'\t']
+        .into_iter()
+        .find(|delimiter| header.contains(delimiter))
+        .unwrap_or(b','))
 }
 
 /// Maximum length of a record, in bytes: enough for an image of 48 MB in base64.

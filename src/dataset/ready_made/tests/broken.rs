@@ -175,6 +175,14 @@ fn skip_bad_is_not_advised_twice() {
 }
 
 #[test]
+fn csv_may_have_tabs() {
+    let (_folder, path) = set("set.tsv", &[question(1, &base64(1))]);
+    let csv = path.with_extension("csv");
+    std::fs::rename(path, &csv).unwrap();
+    assert_eq!(open(&csv, &SetArgs::default()).unwrap().questions.len(), 1);
+}
+
+#[test]
 fn message_names_the_file_once() {
     let broken = question(1, "none.png");
     let other = row(
