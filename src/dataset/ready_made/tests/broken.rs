@@ -183,6 +183,18 @@ fn csv_may_have_tabs() {
 }
 
 #[test]
+fn backslash_in_path_is_named() {
+    let (folder, path) = set("set.json", &[question(1, "images\\a.png")]);
+    std::fs::create_dir(folder.path().join("images")).unwrap();
+    std::fs::write(folder.path().join("images/a.png"), "").unwrap();
+    let problem = refusal(&path, &SetArgs::default());
+    assert!(
+        problem.contains("the file \"images/a.png\" exists: write / in place of \\;"),
+        "{problem}"
+    );
+}
+
+#[test]
 fn message_names_the_file_once() {
     let broken = question(1, "none.png");
     let other = row(
