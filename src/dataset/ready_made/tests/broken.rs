@@ -175,6 +175,29 @@ fn skip_bad_is_not_advised_twice() {
 }
 
 #[test]
+fn missing_quotes_in_csv_are_named() {
+    let row = |id: &str, question: &str| format!("{id},a.png,{question},x,y,A\n");
+    let head = "id,image,question,A,B,answer\n".to_owned();
+    let (good, open_quote) = (row("1", "Which?"), row("2", "\"Which?"));
+    for (rows, is_refused) in [
+        ([&*good, &open_quote, &good], true),
+        ([&open_quote, &good, &open_quote], true),
+        (
+            [&good, &row("2", "\"Which \"\"one\"\",\nor not?\""), &good],
+            false,
+        ),
+        ([&good, &row("2", "A 5\" screen?"), &good], false),
+        ([&good, &row("2", "\"Which\" one?"), &good], false),
+    ] {
+        let (_folder, path) = set("set.csv", &[]);
+        std::fs::write(&path, head.clone() + &rows.concat()).unwrap();
+        let problem = refusal(&path, &SetArgs::default());
+        let is_named = problem.contains("its closing quote is missing");
+        assert_eq!(is_named, is_refused, "{rows:?}: {problem}");
+    }
+}
+
+#[test]
 fn csv_may_have_tabs() {
     let (_folder, path) = set("set.tsv", &[question(1, &base64(1))]);
     let csv = path.with_extension("csv");
