@@ -316,6 +316,16 @@ fn assemble(
         .map_err(|problem| Error::data(context.place.display(), problem))?;
         ids = frames.ids(&set.questions).map_err(with_skip_hint)?;
     }
+    let id_columns = &context.roles.ids;
+    if is_native_format(context.table)
+        && !id_columns.is_empty()
+        && id_columns.iter().all(|column| column.name != ids.source())
+    {
+        tracing::warn!(
+            "{}: some questions have no id or the same, so all get an id from their content",
+            context.place.display()
+        );
+    }
     let families = FamilySource::choose(context.table, &context.roles.families, &set.questions);
     let questions = build_questions(
         context,

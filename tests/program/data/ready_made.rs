@@ -321,6 +321,20 @@ fn nested_images_need_question_file() {
 }
 
 #[test]
+fn repeated_ids_of_own_format_are_named() {
+    let bench = Bench::new();
+    bench.complete(&words("init data"));
+    fs::remove_file(bench.path("data/questions.csv")).unwrap();
+    let line = |question: &str| json!({"id": "a", "frame": "room1.png", "question": question, "choices": ["yes", "no"], "answer": "yes"});
+    bench.file(
+        "data/questions.jsonl",
+        format!("{}\n{}\n", line("A?"), line("B?")),
+    );
+    let called = bench.call(&words("--data data --model random"));
+    insta::assert_snapshot!(lines_with(&called.stderr, "id"), @"WARN data/questions.jsonl: some questions have no id or the same, so all get an id from their content");
+}
+
+#[test]
 fn answer_outside_options_is_refused() {
     let bench = Bench::new();
     bench.complete(&words("init data"));
