@@ -50,7 +50,8 @@ pub(super) fn open(
                 frame: FrameId(id.clone()),
                 family: Family::Other("label".to_owned()),
                 text: question.to_owned(),
-                choices: Choices::new(texts, truth.unwrap_or(usize::MAX))?,
+                choices: Choices::new(texts, truth.unwrap_or(usize::MAX))
+                    .map_err(|e| e.at(folder.display().to_string()))?,
                 group: None,
                 evidence: serde_json::Value::Null,
             });
@@ -158,6 +159,20 @@ mod tests {
         }
         let problem = classes(folder.path()).unwrap_err().to_string();
         assert!(problem.contains("is not UTF-8; rename"), "{problem}");
+    }
+
+    #[test]
+    fn equal_class_names_name_the_folder() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["dog", "Dog "] {
+            std::fs::create_dir(folder.path().join(name)).unwrap();
+            std::fs::write(folder.path().join(name).join("a.png"), "").unwrap();
+        }
+        let problem = open(folder.path(), "Which?", None).unwrap_err().to_string();
+        assert!(
+            problem.starts_with(&*folder.path().to_string_lossy()),
+            "{problem}"
+        );
     }
 
     const NAMES: [&str; 5] = ["Bicycle", "Boat", "Cup", "Dog", "Table"];
