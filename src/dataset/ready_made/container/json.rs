@@ -10,7 +10,7 @@ use serde_json::{Map, Value};
 use super::super::cells::{Cell, JsonUnit, RowPlace, Table};
 use super::json_scan::{JsonScanner, JsonValue, MAX_ROW_BYTES, ValueKind};
 use crate::error::{Error, Result};
-use crate::files::reading;
+use crate::files::reading::{self, nan_problem};
 use crate::types::shell_word;
 
 type FileScanner = JsonScanner<BufReader<File>>;
@@ -204,15 +204,6 @@ fn parse_object(value: &JsonValue, number: u64) -> Result<Map<String, Value>, St
             )),
         },
     }
-}
-
-/// Error message for a row that is not JSON because of a `NaN` or `Infinity`, as Python writes them; `None` for other faults.
-fn nan_problem(bytes: &[u8], error: &serde_json::Error) -> Option<&'static str> {
-    let line = bytes.split(|byte| *byte == b'\n').nth(error.line() - 1)?;
-    let rest = line.get(error.column().saturating_sub(1)..)?;
-    let rest = rest.strip_prefix(b"-").unwrap_or(rest);
-    (rest.starts_with(b"NaN") || rest.starts_with(b"Infinity"))
-        .then_some("NaN or Infinity, which JSON does not have; write null in its place")
 }
 
 /// Appends the rows of an object whose fields are the rows by id.
