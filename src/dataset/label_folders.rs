@@ -1,6 +1,7 @@
 //! Classification data sets with one folder of images per class: [`open`].
 
 use std::collections::BTreeMap;
+use std::ffi::OsStr;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
@@ -49,7 +50,8 @@ pub(super) fn open(
                 frame: FrameId(id.clone()),
                 family: Family::Other("label".to_owned()),
                 text: question.to_owned(),
-                choices: Choices::new(texts, truth.unwrap_or(usize::MAX))?,
+                choices: Choices::new(texts, truth.unwrap_or(usize::MAX))
+                    .map_err(|e| e.at(folder.display().to_string()))?,
                 group: None,
                 evidence: serde_json::Value::Null,
             });
@@ -66,11 +68,10 @@ pub(super) fn open(
 fn classes(folder: &Path) -> Result<BTreeMap<String, Vec<PathBuf>>> {
     let mut classes = BTreeMap::new();
     for inner in entries(folder)?.into_iter().filter(|path| path.is_dir()) {
-        let name = inner
-            .file_name()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned();
+        let Some(name) = inner.file_name().and_then(OsStr::to_str) else {
+            let problem = "the name of a class is not UTF-8; rename the folder";
+            return Err(Error::data(inner.display(), problem));
+        };
         if name.starts_with('.') {
             continue;
         }
@@ -80,7 +81,7 @@ fn classes(folder: &Path) -> Result<BTreeMap<String, Vec<PathBuf>>> {
             tracing::warn!("{}: no images in it, so it is not a class", inner.display());
             continue;
         }
-        classes.insert(name, found.images);
+        classes.insert(name.to_owned(), found.images);
     }
     if classes.len() < 2 {
         let found = if classes.is_empty() {
@@ -149,6 +150,34 @@ fn draw_choices<'n>(names: &[&'n str], truth: &str, count: usize, image: &Digest
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[cfg(unix)]
+    #[test]
+    fn class_name_must_be_utf8() {
+        use std::os::unix::ffi::OsStrExt as _;
+        let folder = tempfile::tempdir().unwrap();
+        for name in [&b"caf\xe9"[..], b"caf\xe8"] {
+            let class = folder.path().join(OsStr::from_bytes(name));
+            std::fs::create_dir(&class).unwrap();
+            std::fs::write(class.join("a.png"), "").unwrap();
+        }
+        let problem = classes(folder.path()).unwrap_err().to_string();
+        assert!(problem.contains("is not UTF-8; rename"), "{problem}");
+    }
+
+    #[test]
+    fn equal_class_names_name_the_folder() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["dog", "Dog "] {
+            std::fs::create_dir(folder.path().join(name)).unwrap();
+            std::fs::write(folder.path().join(name).join("a.png"), "").unwrap();
+        }
+        let problem = open(folder.path(), "Which?", None).unwrap_err().to_string();
+        assert!(
+            problem.starts_with(&*folder.path().to_string_lossy()),
+            "{problem}"
+        );
+    }
 
     const NAMES: [&str; 5] = ["Bicycle", "Boat", "Cup", "Dog", "Table"];
 

@@ -93,7 +93,6 @@ impl Habitat {
         let semantics = files(&folder.join("semantic"), &[".npy", ".png"])?;
         let trajectory = folder.join("trajectory.jsonl");
         let mut steps = read_trajectory(&trajectory)?;
-        self.scene_files.push(trajectory);
         for (frame, rgb) in images {
             let Some(semantic) = semantics.get(&frame) else {
                 let problem = format_args!("no semantic map of the frame {frame:?}");
@@ -113,6 +112,14 @@ impl Habitat {
             self.maps
                 .push((depths.get(&frame).cloned(), semantic.clone()));
         }
+        if let Some(frame) = steps.keys().next() {
+            tracing::warn!(
+                "{}: frames without an image in rgb: {}, for example {frame:?}; the name of a frame is that of its image without the extension",
+                trajectory.display(),
+                steps.len()
+            );
+        }
+        self.scene_files.push(trajectory);
         self.listing.names.insert(name.clone(), names);
         self.scenes.insert(name, scene);
         Ok(())
@@ -150,21 +157,28 @@ impl Habitat {
         let offset = u32::from(names.contains_key(&0));
         let names = names
             .into_iter()
-            .map(|(id, name)| (id + offset, name))
+            .filter_map(|(id, name)| Some((id.checked_add(offset)?, name)))
             .collect();
         Ok((SceneInfo { rooms, offset }, names))
     }
 }
 
 /// Reads the steps of a trajectory, by frame name; empty if the file does not exist.
+///
+/// # Errors
+/// If a line cannot be read, or two lines are about the same frame.
 fn read_trajectory(path: &Path) -> Result<BTreeMap<String, TrajectoryStep>> {
     if !path.exists() {
         return Ok(BTreeMap::new());
     }
-    Ok(json_lines::<TrajectoryStep>(path)?
-        .into_iter()
-        .map(|(_, step)| (step.frame.clone(), step))
-        .collect())
+    let mut steps = BTreeMap::new();
+    for (number, step) in json_lines::<TrajectoryStep>(path)? {
+        if let Some(first) = steps.insert(step.frame.clone(), step) {
+            let problem = format_args!("a second line of the frame {:?}", first.frame);
+            return Err(Error::line(path, number, problem));
+        }
+    }
+    Ok(steps)
 }
 
 impl Adapter for Habitat {

@@ -328,13 +328,13 @@ fn wrong_questions_name_their_line() {
     let bench = Bench::new();
     data(&bench, |question| question["answer"] = "maybe".into());
     insta::assert_snapshot!(refused(&bench, FRAMES), @r#"
-    error: frames/questions.jsonl: frames/questions.jsonl, line 1: the answer "maybe" (column "answer") is not one
-        of the options ["yes", "no"], neither by letter nor by text nor by number
+    error: frames/questions.jsonl: line 1: the answer "maybe" (column "answer") is not one of the options ["yes",
+        "no"], neither by letter nor by text nor by number
     "#);
     data(&bench, |question| question["choices"] = json!(["yes"]));
     insta::assert_snapshot!(refused(&bench, FRAMES), @r#"
-    error: frames/questions.jsonl: frames/questions.jsonl, line 1: the answer "no" (column "answer") is not one of
-        the options ["yes"], neither by letter nor by text nor by number
+    error: frames/questions.jsonl: line 1: the answer "no" (column "answer") is not one of the options ["yes"],
+        neither by letter nor by text nor by number
     "#);
     data(&bench, |question| question["frame"] = "z.png".into());
     insta::assert_snapshot!(refused(&bench, FRAMES), @r#"

@@ -99,11 +99,11 @@ pub(super) fn items(
             }),
             Err(PartsError::Row(problem)) => {
                 omissions.add(OmissionReason::Bad, || {
-                    format!("{}: {problem}", table.place(index))
+                    format!("{}: {problem}", table.place_in_set(index))
                 });
             }
             Err(PartsError::Set(problem)) => {
-                return Err(format!("{}: {problem}", table.place(index)));
+                return Err(format!("{}: {problem}", table.place_in_set(index)));
             }
         }
     }

@@ -78,6 +78,10 @@ pub(super) fn open(places: &[PathBuf], stem: &str, args: &SetArgs) -> Result<Rea
     allowed_roots.extend(further);
     let root = Root::new(&folder, &allowed_roots)?;
     let files: Vec<Arc<SetFile>> = files.into_iter().map(Arc::new).collect();
+    let place = match &*files {
+        [file] => file.label.path.as_path(),
+        _ => place,
+    };
     let mut table = read_files(&files, joined, args)?;
     table.parse_cells(info.map.iter().chain(&args.map));
     let hint = match args.preset {
@@ -312,6 +316,16 @@ fn assemble(
         .map_err(|problem| Error::data(context.place.display(), problem))?;
         ids = frames.ids(&set.questions).map_err(with_skip_hint)?;
     }
+    let id_columns = &context.roles.ids;
+    if is_native_format(context.table)
+        && !id_columns.is_empty()
+        && id_columns.iter().all(|column| column.name != ids.source())
+    {
+        tracing::warn!(
+            "{}: some questions have no id or the same, so all get an id from their content",
+            context.place.display()
+        );
+    }
     let families = FamilySource::choose(context.table, &context.roles.families, &set.questions);
     let questions = build_questions(
         context,
@@ -376,7 +390,12 @@ fn omit_unusable_images(
     questions.retain(|question| match frames.problem(question.row) {
         None => true,
         Some(problem) => {
-            omissions.add(OmissionReason::Bad, || problem.to_string());
+            omissions.add(OmissionReason::Bad, || match problem {
+                Error::Data { problem, .. } => {
+                    format!("{}: {problem}", context.table.place_in_set(question.row))
+                }
+                other => other.to_string(),
+            });
             false
         }
     });

@@ -252,6 +252,26 @@ fn faulty_render_labels_are_named() {
 }
 
 #[test]
+fn trajectory_must_fit_its_images() {
+    let scene = habitat();
+    let trajectory = "00800-x/trajectory.jsonl";
+    scene.text(
+        trajectory,
+        "{\"frame\":\"000.png\"}\n{\"frame\":\"001.png\"}\n",
+    );
+    let message = scene.run("habitat", &[]).ended(0).stderr;
+    insta::assert_snapshot!(redacted(&message), @r#"
+    WARN [TMP]/src/00800-x/trajectory.jsonl: frames without an image in rgb: 2, for example "000.png"; the name
+       of a frame is that of its image without the extension
+    "#);
+    scene.text(trajectory, "{\"frame\":\"000\"}\n{\"frame\":\"000\"}\n");
+    insta::assert_snapshot!(
+        redacted(&scene.refused("habitat", &["--force"])),
+        @r#"error: [TMP]/src/00800-x/trajectory.jsonl, line 2: a second line of the frame "000""#
+    );
+}
+
+#[test]
 fn render_of_eight_bits_is_skipped() {
     let scene = habitat();
     scene.shallow("00800-x/semantic/001.png", 3, 3);

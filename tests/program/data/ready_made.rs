@@ -34,8 +34,8 @@ fn ambiguous_answers_need_a_mapping() {
     let called = run("");
     insta::assert_snapshot!(called.messages(), @r#"
     exit code: 2
-    error: set.json: set.json, object 1: the answer "1" may be read as index0 or as index1, which differ among the
-        options ["x", "y", "z"]; --map answer=answer:index0 or --map answer=answer:index1 says which is meant
+    error: set.json: object 1: the answer "1" may be read as index0 or as index1, which differ among the options
+        ["x", "y", "z"]; --map answer=answer:index0 or --map answer=answer:index1 says which is meant
     "#);
     let called = run("--map answer=answer:index1");
     insta::assert_snapshot!(called.messages(), @r#"
@@ -321,6 +321,20 @@ fn nested_images_need_question_file() {
 }
 
 #[test]
+fn repeated_ids_of_own_format_are_named() {
+    let bench = Bench::new();
+    bench.complete(&words("init data"));
+    fs::remove_file(bench.path("data/questions.csv")).unwrap();
+    let line = |question: &str| json!({"id": "a", "frame": "room1.png", "question": question, "choices": ["yes", "no"], "answer": "yes"});
+    bench.file(
+        "data/questions.jsonl",
+        format!("{}\n{}\n", line("A?"), line("B?")),
+    );
+    let called = bench.call(&words("--data data --model random"));
+    insta::assert_snapshot!(lines_with(&called.stderr, "id"), @"WARN data/questions.jsonl: some questions have no id or the same, so all get an id from their content");
+}
+
+#[test]
 fn answer_outside_options_is_refused() {
     let bench = Bench::new();
     bench.complete(&words("init data"));
@@ -333,8 +347,8 @@ fn answer_outside_options_is_refused() {
     let refused = bench.call(&words("--data data --model random"));
     insta::assert_snapshot!(refused.messages(), @r#"
     exit code: 2
-    error: data/questions.jsonl: 1 of 2 rows are broken; the first: data/questions.jsonl, line 2: the answer "A"
-        is not one of the options ["yes", "no"] (read as text, which fits 1 rows); --skip bad=50% leaves it out
+    error: data/questions.jsonl: 1 of 2 rows are broken; the first: line 2: the answer "A" is not one of the
+        options ["yes", "no"] (read as text, which fits 1 rows); --skip bad=50% leaves it out
     "#);
 }
 

@@ -279,6 +279,14 @@ impl Table {
         let row = &self.rows[row];
         format!("{}, {}", self.files[row.file].path.display(), row.place)
     }
+
+    /// As [`Self::place`], but without the file if the set has only one, for messages that begin with the file of the set.
+    pub(in crate::dataset::ready_made) fn place_in_set(&self, row: usize) -> String {
+        match &*self.files {
+            [_] => self.rows[row].place.to_string(),
+            _ => self.place(row),
+        }
+    }
 }
 
 /// Error message for a set with too many rows.

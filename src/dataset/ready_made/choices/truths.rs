@@ -51,7 +51,10 @@ pub(in crate::dataset::ready_made) fn find_truths(
     if roles.answers.is_empty() && items.iter().all(|item| item.options.is_none()) {
         for item in items {
             omissions.add(OmissionReason::Open, || {
-                format!("not in a column that is known ({})", table.place(item.row))
+                format!(
+                    "not in a column that is known ({})",
+                    table.place_in_set(item.row)
+                )
             });
         }
         return Ok(Truths::default());
@@ -142,7 +145,7 @@ fn are_texts(table: &Table, column: &Column) -> bool {
 /// Pairs each item with its answer. Items without an answer, or with several, are added to the omissions.
 ///
 /// # Errors
-/// If no item has an answer. The error suggests `other_column_flag`, the flag to read another column, if there is one.
+/// If the column has no answer in any row. The error suggests `other_column_flag`, the flag to read another column, if there is one.
 fn with_answers(
     table: &Table,
     column: &Column,
@@ -150,9 +153,8 @@ fn with_answers(
     omissions: &mut Omissions,
     other_column_flag: Option<String>,
 ) -> Result<Vec<(Item, String)>, String> {
-    let count = items.len();
     let mut absent = Vec::new();
-    let mut found = Vec::with_capacity(count);
+    let mut found = Vec::with_capacity(items.len());
     for item in items {
         match AnswerCell::from_row(&table.rows[item.row], column) {
             AnswerCell::One(answer) => found.push((item, answer)),
@@ -162,7 +164,11 @@ fn with_answers(
             AnswerCell::Absent => absent.push(item.row),
         }
     }
-    if absent.len() == count && count > 0 {
+    if table
+        .rows
+        .iter()
+        .all(|row| AnswerCell::from_row(row, column) == AnswerCell::Absent)
+    {
         let remedy = other_column_flag.map_or_else(
             || "a test split without them? --read split names another, and --ask FILE asks questions without answers about every image".to_owned(),
             |flag| format!("{flag} reads those of another column"),
@@ -174,7 +180,11 @@ fn with_answers(
     }
     for row in absent {
         omissions.add(OmissionReason::Bad, || {
-            format!("{}: no answer (column {:?})", table.place(row), column.name)
+            format!(
+                "{}: no answer (column {:?})",
+                table.place_in_set(row),
+                column.name
+            )
         });
     }
     Ok(found)
@@ -195,6 +205,9 @@ fn add_choice_questions(
     let column = answer_column::option_column(table, roles, &items)?;
     let other_column_flag = answer_column::suggest_column(table, roles, &items);
     let items = with_answers(table, column, items, omissions, other_column_flag)?;
+    if items.is_empty() {
+        return Ok(());
+    }
     let column_format = ColumnFormat::choose(table, column, format, &items)?;
     let name = column_format.format.name();
     truths.columns.push(format!("{} ({name})", column.name));
@@ -206,7 +219,7 @@ fn add_choice_questions(
         match column_format.choices(&answer, &options.unwrap_or_default()) {
             Ok(choices) => truths.questions.push(ParsedQuestion { row, text, choices }),
             Err(problem) => omissions.add(OmissionReason::Bad, || {
-                format!("{}: {problem}", table.place(row))
+                format!("{}: {problem}", table.place_in_set(row))
             }),
         }
     }
@@ -261,7 +274,7 @@ impl ColumnFormat {
         match items.first() {
             Some((item, answer)) if chosen.fitting_rows == 0 => Err(format!(
                 "{}: the answer {:?} (column {:?}) is not one of the options {}, neither by letter nor by text nor by number",
-                table.place(item.row),
+                table.place_in_set(item.row),
                 excerpt(answer, 60),
                 column.name,
                 rows[0].options.excerpt(120)
@@ -352,7 +365,7 @@ fn ambiguous_answer(
         formats.map(|format| map_flag(Role::Answer, &column.name, Some(format)));
     format!(
         "{}: the answer {:?} may be read as {one} or as {other}, which differ among the options {}; {one_flag} or {other_flag} says which is meant",
-        table.place(item.row),
+        table.place_in_set(item.row),
         excerpt(answer, 60),
         options.excerpt(120),
     )

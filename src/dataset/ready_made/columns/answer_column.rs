@@ -217,7 +217,7 @@ fn first_difference(one: &Candidate<'_>, other: &Candidate<'_>) -> Option<usize>
 fn differing_answers(table: &Table, item: &Item, one: &Column, other: &Column) -> String {
     format!(
         "{}: the answers of {:?} and {:?} differ, {:?} and {:?}; {} or {} says which is meant",
-        table.place(item.row),
+        table.place_in_set(item.row),
         one.name,
         other.name,
         answer_excerpt(table, item, one),

@@ -10,8 +10,8 @@ use super::super::cells::{Cell, RowPlace, Table};
 use crate::error::{Error, Result};
 use crate::files::reading;
 
-/// Returns the delimiter of a table: a tab for the ending `tsv`; otherwise a comma, or a semicolon if the header has semicolons but no
-/// commas, as spreadsheets write it in many countries.
+/// Returns the delimiter of a table: a tab for the ending `tsv`; otherwise a comma, or, if the header has none, a semicolon or tab that
+/// it has. Spreadsheets write semicolons in many countries.
 pub(super) fn delimiter(path: &Path, ending: &str) -> Result<u8> {
     if ending == "tsv" {
         return Ok(b'\t');
@@ -21,8 +21,10 @@ pub(super) fn delimiter(path: &Path, ending: &str) -> Result<u8> {
     let mut file = BufReader::new(file.take(MAX_RECORD_BYTES));
     file.read_until(b'\n', &mut header)
         .map_err(|e| Error::file(path, "read", e))?;
-    let is_comma = header.contains(&b',') || !header.contains(&b';');
-    Ok(if is_comma { b',' } else { b';' })
+    Ok([b',', b';', b'\t']
+        .into_iter()
+        .find(|delimiter| header.contains(delimiter))
+        .unwrap_or(b','))
 }
 
 /// Maximum length of a record, in bytes: enough for an image of 48 MB in base64.
@@ -33,6 +35,69 @@ struct RecordLimited {
     file: File,
     /// Bytes that may still be read for the current record.
     remaining: u64,
+    quotes: QuoteCheck,
+}
+
+/// Finds missing quotes. The reader would take all rows up to the next quote as one cell.
+struct QuoteCheck {
+    delimiter: u8,
+    state: CellState,
+    line: usize,
+    /// Line on which the current quoted cell begins.
+    first_line: usize,
+    /// First line of a cell of several lines whose closing quote is followed by text.
+    fault: Option<usize>,
+}
+
+/// Position in a cell.
+#[derive(Clone, Copy)]
+enum CellState {
+    Start,
+    Unquoted,
+    Quoted,
+    /// After a quote in a quoted cell: the end of the cell, or the first of two that stand for one.
+    Quote,
+}
+
+impl QuoteCheck {
+    fn new(delimiter: u8) -> Self {
+        Self {
+            delimiter,
+            state: CellState::Start,
+            line: 1,
+            first_line: 1,
+            fault: None,
+        }
+    }
+
+    fn add(&mut self, bytes: &[u8]) {
+        for &byte in bytes {
+            let is_end = byte == self.delimiter || byte == b'\n' || byte == b'\r';
+            self.state = match (self.state, byte) {
+                (CellState::Start, b'"') => {
+                    self.first_line = self.line;
+                    CellState::Quoted
+                }
+                (CellState::Quoted, b'"') => CellState::Quote,
+                (CellState::Quoted, _) | (CellState::Quote, b'"') => CellState::Quoted,
+                (_, _) if is_end => CellState::Start,
+                (CellState::Quote, _) => {
+                    if self.first_line != self.line {
+                        self.fault.get_or_insert(self.first_line);
+                    }
+                    CellState::Unquoted
+                }
+                (CellState::Start | CellState::Unquoted, _) => CellState::Unquoted,
+            };
+            self.line += usize::from(byte == b'\n');
+        }
+    }
+
+    /// First line of the first cell with a missing quote, after the whole file was read.
+    fn faulty_line(&self) -> Option<usize> {
+        let is_open = matches!(self.state, CellState::Quoted);
+        self.fault.or(is_open.then_some(self.first_line))
+    }
 }
 
 impl RecordLimited {
@@ -49,6 +114,7 @@ impl Read for RecordLimited {
             .remaining
             .checked_sub(count as u64)
             .ok_or_else(|| io::Error::other(TOO_LONG))?;
+        self.quotes.add(&buffer[..count]);
         Ok(count)
     }
 }
@@ -70,6 +136,7 @@ fn open_reader(path: &Path, delimiter: u8) -> Result<Reader<RecordLimited>> {
         .from_reader(RecordLimited {
             file,
             remaining: MAX_RECORD_BYTES,
+            quotes: QuoteCheck::new(delimiter),
         }))
 }
 
@@ -138,7 +205,13 @@ pub(super) fn read(path: &Path, delimiter: u8, table: &mut Table) -> Result<()> 
             .push(RowPlace::Record(position.clone()), cells)
             .map_err(row_error)?;
     }
-    Ok(())
+    match reader.get_ref().quotes.faulty_line() {
+        None => Ok(()),
+        Some(line) => {
+            let problem = "a quoted cell begins here and takes in the next lines; its closing quote is missing, or a quote in it is not doubled";
+            Err(Error::line(path, line, problem))
+        }
+    }
 }
 
 /// Reads one whole cell, given the position of its record and the name of its column.

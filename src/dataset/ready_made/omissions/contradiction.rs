@@ -78,7 +78,7 @@ fn describe_contradiction(table: &Table, questions: &[ParsedQuestion], pair: [us
     let [one, other] = pair.map(|index| {
         let ParsedQuestion { row, choices, .. } = &questions[index];
         let truth = choices.truth().map_or("", |truth| &choices.texts()[truth]);
-        format!("{} ({truth:?})", table.place(*row))
+        format!("{} ({truth:?})", table.place_in_set(*row))
     });
     format!("{one} and {other} ask the same of the same image, and their answers differ")
 }

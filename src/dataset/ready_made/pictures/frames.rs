@@ -232,6 +232,10 @@ impl<'a> Frames<'a> {
     /// Improves the error for a path in a row: says if the text is not a path, and suggests a column of the row that has an image.
     fn explain_path_error(&self, row: usize, text: &str, problem: String) -> String {
         let problem = explain_non_path(text, problem);
+        let with_slashes = text.replace('\\', "/");
+        if with_slashes != text && self.file(row, &with_slashes).is_ok() {
+            return format!("{problem}; the file {with_slashes:?} exists: write / in place of \\");
+        }
         let row = &self.table.rows[row];
         let image_column =
             self.table
@@ -387,12 +391,10 @@ fn explain_non_path(text: &str, problem: String) -> String {
             .chars()
             .all(|c| c.is_ascii_alphanumeric() || "+/=-_".contains(c) || c.is_whitespace());
     if text.starts_with("data:") || is_long {
-        format!(
-            "its image is base64 that is cut or damaged ({length} characters, {start:?}); --skip bad leaves such rows out"
-        )
+        format!("its image is base64 that is cut or damaged ({length} characters, {start:?})")
     } else if length > MAX_PATH_LENGTH {
         format!(
-            "its image is a text of {length} characters, {start:?}, which is neither base64 nor a path of a file; --skip bad leaves such rows out"
+            "its image is a text of {length} characters, {start:?}, which is neither base64 nor a path of a file"
         )
     } else {
         problem

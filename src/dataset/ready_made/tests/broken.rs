@@ -160,6 +160,93 @@ fn unusable_images_are_left_out_with_skip_bad() {
         "{problem}"
     );
     assert!(problem.len() < 400, "{problem}");
+    assert!(problem.ends_with("; --skip bad leaves such rows out"));
+}
+
+#[test]
+fn skip_bad_is_not_advised_twice() {
+    let (_folder, path) = set("set.tsv", &[question(1, &"QUJD".repeat(2000)[1..])]);
+    let skip = SetArgs {
+        bad: Some(crate::dataset::SkipBad::default()),
+        ..SetArgs::default()
+    };
+    let problem = refusal(&path, &skip);
+    assert!(!problem.contains("leaves such rows out"), "{problem}");
+}
+
+#[test]
+fn missing_quotes_in_csv_are_named() {
+    let row = |id: &str, question: &str| format!("{id},a.png,{question},x,y,A\n");
+    let head = "id,image,question,A,B,answer\n".to_owned();
+    let (good, open_quote) = (row("1", "Which?"), row("2", "\"Which?"));
+    for (rows, is_refused) in [
+        ([&*good, &open_quote, &good], true),
+        ([&open_quote, &good, &open_quote], true),
+        (
+            [&good, &row("2", "\"Which \"\"one\"\",\nor not?\""), &good],
+            false,
+        ),
+        ([&good, &row("2", "A 5\" screen?"), &good], false),
+        ([&good, &row("2", "\"Which\" one?"), &good], false),
+    ] {
+        let (_folder, path) = set("set.csv", &[]);
+        std::fs::write(&path, head.clone() + &rows.concat()).unwrap();
+        let problem = refusal(&path, &SetArgs::default());
+        let is_named = problem.contains("its closing quote is missing");
+        assert_eq!(is_named, is_refused, "{rows:?}: {problem}");
+    }
+}
+
+#[test]
+fn csv_may_have_tabs() {
+    let (_folder, path) = set("set.tsv", &[question(1, &base64(1))]);
+    let csv = path.with_extension("csv");
+    std::fs::rename(path, &csv).unwrap();
+    assert_eq!(open(&csv, &SetArgs::default()).unwrap().questions.len(), 1);
+}
+
+#[test]
+fn backslash_in_path_is_named() {
+    let (folder, path) = set("set.json", &[question(1, "images\\a.png")]);
+    std::fs::create_dir(folder.path().join("images")).unwrap();
+    std::fs::write(folder.path().join("images/a.png"), "").unwrap();
+    let problem = refusal(&path, &SetArgs::default());
+    assert!(
+        problem.contains("the file \"images/a.png\" exists: write / in place of \\;"),
+        "{problem}"
+    );
+}
+
+#[test]
+fn message_names_the_file_once() {
+    let broken = question(1, "none.png");
+    let other = row(
+        json!({"id": 2, "question": "?", "options": ["x", "y"], "answer": "z", "image": base64(1)}),
+    );
+    let skip = SetArgs {
+        bad: Some(crate::dataset::SkipBad::default()),
+        ..SetArgs::default()
+    };
+    for bad in [broken, other] {
+        let (folder, path) = set("set.json", &[question(3, &base64(2)), bad]);
+        for place in [&path, folder.path()] {
+            let problem = refusal(place, &skip);
+            assert_eq!(problem.matches("set.json").count(), 1, "{problem}");
+        }
+    }
+}
+
+#[test]
+fn nan_in_json_is_named() {
+    for name in ["set.jsonl", "set.json"] {
+        for number in ["NaN", "-Infinity"] {
+            let (_folder, path) = set(name, &[question(7, "a.png")]);
+            let text = std::fs::read_to_string(&path).unwrap();
+            std::fs::write(&path, text.replace('7', number)).unwrap();
+            let problem = refusal(&path, &SetArgs::default());
+            assert!(problem.contains("write null"), "{problem}");
+        }
+    }
 }
 
 fn by_index(index: u8) -> Map<String, Value> {

@@ -50,6 +50,19 @@ fn yes_no_question_without_answer_is_bad() {
 }
 
 #[test]
+fn row_without_options_and_answer_is_bad() {
+    let full = json!({"question": "Which?", "A": "x", "B": "y", "answer": "A", "image": base64(1)});
+    let short = json!({"question": "Which?", "image": base64(2)});
+    let (_folder, path) = with(vec![full, short]);
+    let problem = refusal(&path, &skipping());
+    assert!(
+        problem.contains("1 of 2 rows are broken; the first: ")
+            && problem.contains("object 2: no answer (column \"answer\")"),
+        "{problem}"
+    );
+}
+
+#[test]
 fn empty_option_list_is_no_options_but_none_is_one() {
     let (_folder, path) = with(vec![
         json!({"question": "Which?", "options": "['x', 'y']", "answer": "B", "image": base64(1)}),

@@ -152,7 +152,10 @@ impl<'de> Visitor<'de> for ExtraValueVisitor {
     type Value = ExtraValue;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "a number, true, false, a list of these, {FORMS}")
+        write!(
+            f,
+            "a number, true, false, a list of these, {FORMS} (other keys stand above [extra])"
+        )
     }
 
     fn visit_bool<E: Error>(self, value: bool) -> Result<ExtraValue, E> {

@@ -421,6 +421,7 @@ mod tests {
             ("tile = \"exact\"", "exact:N"),
             ("[extra]\ngamma = nan", "extra.gamma"),
             ("[extra]\na = { from = \"image +\" }", "the end"),
+            ("[extra]\nimage = \"y\"", "other keys stand above [extra]"),
             ("channels = \"yuv\"", "yuv"),
             ("input = \"2 * imag\"", "names `imag`"),
             ("image = \"(1\"", "a closing parenthesis"),

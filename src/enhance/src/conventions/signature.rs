@@ -70,7 +70,7 @@ impl Signature {
             .find(|name| !extras.iter().any(|extra| extra.port.name == **name))
         {
             return Err(format!(
-                "MODEL.onnx.toml sets {name:?} under [extra], which is not an input besides the image; delete that line; inputs: {}",
+                "MODEL.onnx.toml sets {name:?} under [extra], which is not an input besides the image; move that line above [extra] if it is another key, else delete it; inputs: {}",
                 format_ports(inputs)
             ));
         }

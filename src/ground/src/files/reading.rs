@@ -142,6 +142,16 @@ pub fn json<T: DeserializeOwned>(path: &Path) -> Result<T> {
     serde_json::from_str(&text(path)?).map_err(|e| Error::data(path.display(), e))
 }
 
+/// Error message for text that is not JSON because of a `NaN` or `Infinity`, as Python writes them; `None` for other faults.
+#[must_use]
+pub fn nan_problem(bytes: &[u8], error: &serde_json::Error) -> Option<&'static str> {
+    let line = bytes.split(|byte| *byte == b'\n').nth(error.line() - 1)?;
+    let rest = line.get(error.column().saturating_sub(1)..)?;
+    let rest = rest.strip_prefix(b"-").unwrap_or(rest);
+    (rest.starts_with(b"NaN") || rest.starts_with(b"Infinity"))
+        .then_some("NaN or Infinity, which JSON does not have; write null in its place")
+}
+
 /// The objects of a file with their line numbers, counted from 1; empty lines and a byte order mark are skipped.
 ///
 /// # Errors
@@ -170,8 +180,13 @@ pub fn json_lines<T: DeserializeOwned>(path: &Path) -> Result<Vec<(usize, T)>> {
             _ => &line[..],
         };
         if !text.trim_ascii().is_empty() {
-            let value = serde_json::from_slice(text.trim_ascii_end())
-                .map_err(|e| Error::json_line(path, number, &e))?;
+            let value =
+                serde_json::from_slice(text.trim_ascii_end()).map_err(|e| {
+                    match nan_problem(text, &e) {
+                        Some(problem) => Error::line(path, number, problem),
+                        None => Error::json_line(path, number, &e),
+                    }
+                })?;
             values.push((number, value));
         }
     }
@@ -199,6 +214,12 @@ mod tests {
         fs::write(&path, text.trim_end_matches(['3', '\n', ' '])).unwrap();
         assert_eq!(json_lines::<u8>(&path).unwrap(), [(1, 1), (3, 2)]);
         assert!(settings(&path).is_ok());
+        fs::write(&path, "1\nNaN\n").unwrap();
+        let error = json_lines::<u8>(&path).unwrap_err().to_string();
+        assert!(
+            error.contains("line 2: NaN or Infinity, which JSON does not have"),
+            "{error}"
+        );
         fs::write(&path, vec![b' '; 1 + MAX_SETTINGS_BYTES as usize]).unwrap();
         let error = settings(&path).unwrap_err().to_string();
         assert!(

@@ -215,6 +215,10 @@ fn further_inputs_need_values() {
             "[extra]\nstrength = 1\ngamma = 1",
             "\"gamma\" under [extra], which is not an input",
         ),
+        (
+            "[extra]\nstrength = 1\nmean = [0, 0, 0]",
+            "move that line above [extra] if it is another key",
+        ),
     ] {
         let message = infer_with(&inputs, &[image("y")], text).unwrap_err();
         assert!(message.contains(part), "{message}");
