@@ -156,7 +156,7 @@ mod tests {
     fn class_name_must_be_utf8() {
         use std::os::unix::ffi::OsStrExt as _;
         let folder = tempfile::tempdir().unwrap();
-        for name in [&b"caf\xe9"[..], b"caf\xe8"] {
+        for name in [&b"\xe9"[..], b"\xe8"] {
             let class = folder.path().join(OsStr::from_bytes(name));
             std::fs::create_dir(&class).unwrap();
             std::fs::write(class.join("a.png"), "").unwrap();

@@ -16,6 +16,7 @@ use crate::engine::circuit_breaker::{CircuitBreaker, EndReason};
 use crate::engine::costs::{
     Budget, BudgetNotes, InFlightCost, MeasuredTokens, Permit, text_tokens,
 };
+use crate::engine::first_failures::FirstFailures;
 use crate::engine::interrupt::Interrupt;
 use crate::engine::lanes::{Lanes, PreparedTrial};
 use crate::engine::models::ModelUnderTest;
@@ -30,7 +31,7 @@ use crate::images::timings::{TimedStep, Timings};
 use crate::images::trials::{Item, PreparedGroup, Trial};
 use crate::images::workers::thread_start_error;
 use crate::store::Store;
-use crate::types::{Digest, Failure, FailureKind, Finish, LostAttempts, Record, Reply, SetLight};
+use crate::types::{Digest, FailureKind, Finish, LostAttempts, Record, Reply, SetLight};
 use darkqa_score::answers::record::answered;
 use darkqa_score::answers::{ImageDependence, LitReply};
 
@@ -95,7 +96,7 @@ impl Dispatcher<'_> {
             given_up: watch::Sender::new(false),
             in_flight_cost: self.in_flight_cost,
             are_notes_lost: false,
-            first_failures: BTreeMap::new(),
+            first_failures: FirstFailures::default(),
         };
         std::thread::scope(|scope| {
             scope.spawn(move || make(&sender));
@@ -152,14 +153,7 @@ struct ReplySink<'a, I: Item> {
     in_flight_cost: InFlightCost,
     /// True if a note about an image could not be written.
     are_notes_lost: bool,
-    /// First failure of each model and kind.
-    first_failures: BTreeMap<(usize, FailureKind), FirstFailure>,
-}
-
-/// Frame or walk of a failed trial, and the message of its failure.
-struct FirstFailure {
-    source: String,
-    message: String,
+    first_failures: FirstFailures,
 }
 
 /// State of the first question to a model. With `--max-cost`, other questions wait until it ends, because the charged tokens of prompts
@@ -257,7 +251,9 @@ impl<I: Item> ReplySink<'_, I> {
                  leave it out, or send it smaller (--image max-side=N)"
             );
         }
-        self.warn_failures();
+        self.first_failures.warn(&self.dispatcher.models, |model| {
+            self.breaker.is_stopped(model)
+        });
         self.store.sync()?;
         self.in_flight_cost.end(self.store.folder())?;
         Ok(self.breaker.into_end())
@@ -506,7 +502,7 @@ impl<I: Item> ReplySink<'_, I> {
                 let may_be_cause = self.suspects.may_be_cause(trial.model, source);
                 self.breaker
                     .failed(trial.model, error, source, may_be_cause);
-                self.note_failure(trial.model, source, error);
+                self.first_failures.add(trial.model, source, &error.failure);
                 // If the endpoint is the cause or the run ends, the trial does not count as asked, unless it cost something.
                 if error.reach != Reach::Trial && error.lost.is_none() {
                     return Ok(());
@@ -539,42 +535,6 @@ impl<I: Item> ReplySink<'_, I> {
         }
         self.check_dependence(&ready.trial, &record);
         Ok(())
-    }
-
-    /// Keeps the first failure of each kind and model; images that cannot be made are the same for all models.
-    fn note_failure(&mut self, model: usize, source: &str, error: &AskError) {
-        let Failure { kind, message, .. } = &error.failure;
-        let model = if *kind == FailureKind::Image {
-            0
-        } else {
-            model
-        };
-        self.first_failures
-            .entry((model, *kind))
-            .or_insert_with(|| FirstFailure {
-                source: source.to_owned(),
-                message: message.clone(),
-            });
-    }
-
-    /// Describes the first failure of each kind, unless the error that stopped its model describes it.
-    fn warn_failures(&self) {
-        for ((model, kind), failure) in &self.first_failures {
-            if self.breaker.is_stopped(*model) {
-                continue;
-            }
-            if *kind == FailureKind::Image {
-                // The message names the frame, and the image fails for all models.
-                tracing::warn!("a trial failed: {}", failure.message);
-            } else {
-                tracing::warn!(
-                    "{}: a trial about {} failed: {}",
-                    self.dispatcher.models[*model].name,
-                    failure.source,
-                    failure.message
-                );
-            }
-        }
     }
 
     /// Warns once for each model at an endpoint if its replies do not depend on the image. Skipped for photographs taken in the dark, where

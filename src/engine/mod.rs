@@ -10,6 +10,7 @@ pub(crate) mod costs;
 pub(crate) mod dark_already;
 pub(crate) mod dispatch;
 pub(crate) mod experiment;
+pub(crate) mod first_failures;
 pub(crate) mod folder;
 pub(crate) mod identity;
 pub(crate) mod interrupt;
