@@ -237,6 +237,19 @@ fn undetected_effects_may_be_unconfirmed() {
     );
 }
 
+#[test]
+fn effects_of_strict_parsing_alone_are_named() {
+    let mut found = finding(PooledKind::Enhancer, 1, 0.085, Better);
+    found.lenient = parsed(PooledKind::Enhancer, 0.05, NotShown);
+    let said = checked(&pooled::enhancers(&[&found], &[], ClusterUnit::Scene)[0]);
+    assert!(
+        said.starts_with(
+            "· lift at L1: accuracy 8.5 points higher, in the strict parsing alone. ("
+        ),
+        "{said}"
+    );
+}
+
 /// Findings about L1–L5 without a verdict, and the mean of L4–L5 with one.
 fn detected_by_mean(
     kind: PooledKind,
