@@ -93,7 +93,7 @@ pub(super) fn untouched(findings: &Findings<'_>) -> Option<Sentence> {
         // One sentence for all topics reports that no verdict is possible.
         Claim::Impossible => return None,
         _ => {
-            if let Some(unconfirmed) = unconfirmed(finding) {
+            if let Some(unconfirmed) = unconfirmed(finding.claim(), finding.strict.difference) {
                 let difference = finding.strict.difference.value;
                 let verb = if difference < 0.0 { "cost" } else { "add" };
                 format!(

@@ -158,7 +158,9 @@ pub(super) fn with_variant(
             if let Some(format) = format_alone(levels, unit) {
                 return Some(format);
             }
-            let text = if let Some(unconfirmed) = unconfirmed(darkest) {
+            let text = if let Some(unconfirmed) =
+                unconfirmed(darkest.claim(), darkest.strict.difference)
+            {
                 format!(
                     "at {} accuracy is {} points {} than at L0{unconfirmed}.",
                     darkest.level,

@@ -5,6 +5,7 @@ use super::sentence::{Numbers, Sentence, Tone, level_runs, models};
 use crate::types::AxisLevel;
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::{Claim, PooledFinding};
+use darkqa_score::estimate::Estimate;
 use darkqa_score::model_in_condition;
 use darkqa_score::significance::Significance;
 
@@ -144,7 +145,7 @@ pub(super) fn noise(
         return vec![format];
     }
     let mut numbers = Numbers::new(unit);
-    let text = if let Some(unconfirmed) = unconfirmed(largest) {
+    let text = if let Some(unconfirmed) = unconfirmed(largest.claim(), largest.strict.difference) {
         let difference = largest.strict.difference.value;
         format!(
             "With noise, accuracy is {} points {} than by the exposure drop alone ({}){unconfirmed}.",
@@ -232,7 +233,7 @@ fn no_effect(
     let mut numbers = Numbers::new(unit);
     numbers.about(name);
     let at = runs(undetected, levels);
-    let text = if let Some(unconfirmed) = unconfirmed(largest) {
+    let text = if let Some(unconfirmed) = unconfirmed(largest.claim(), largest.strict.difference) {
         let difference = largest.strict.difference.value;
         let up_to = if undetected.len() > 1 { "up to " } else { "" };
         let size = numbers.size("effect", difference);
@@ -265,10 +266,9 @@ pub(super) fn lower_or_higher(difference: f64) -> &'static str {
 
 /// The end of a sentence about an effect that does not count as detected although its interval excludes 0; `None` for other findings. The
 /// sentence reports such an effect, because "nothing was detected" next to the interval would look contradictory.
-pub(super) fn unconfirmed(finding: &PooledFinding) -> Option<&'static str> {
-    let difference = finding.strict.difference;
+pub(super) fn unconfirmed(claim: Claim, difference: Estimate) -> Option<&'static str> {
     let excludes_zero = difference.low > 0.0 || difference.high < 0.0;
-    match finding.claim() {
+    match claim {
         Claim::Open | Claim::InOwnSet if excludes_zero => Some(UNCONFIRMED),
         Claim::StrictOnly(_) => Some(", in the strict parsing alone"),
         _ => None,

@@ -4,6 +4,7 @@ mod below_blind;
 mod best;
 mod confidence;
 mod hallucination;
+mod real;
 mod records;
 mod simulation;
 
