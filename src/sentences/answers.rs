@@ -1,5 +1,6 @@
 //! Sentences about replies: the number that could not be read, and whether image fidelity predicts right answers.
 
+use super::pooled::UNCONFIRMED;
 use super::sentence::{Numbers, Sentence, Tone};
 use crate::text::alert::MAX_UNREAD;
 use crate::types::UnreadReason;
@@ -42,15 +43,24 @@ pub(super) fn fidelity(findings: &Findings<'_>) -> Option<Sentence> {
     let mut numbers = Numbers::new(findings.unit);
     let estimate = auc.estimate;
     let is_detected = fidelity.p_report.is_some_and(|p| p < ALPHA);
-    let (tone, text) = if is_detected && estimate.value > 0.5 {
-        let text = "Within a condition, images with a higher PSNR get more right answers.";
-        (Tone::Better, text)
-    } else if is_detected {
-        let text = "Within a condition, images with a higher PSNR get fewer right answers.";
-        (Tone::Worse, text)
+    let excludes_chance = estimate.low > 0.5 || estimate.high < 0.5;
+    let (more, tone) = if estimate.value > 0.5 {
+        ("more", Tone::Better)
+    } else {
+        ("fewer", Tone::Worse)
+    };
+    let (tone, text) = if is_detected {
+        let text =
+            format!("Within a condition, images with a higher PSNR get {more} right answers.");
+        (tone, text)
+    } else if excludes_chance {
+        let text = format!(
+            "Within a condition, images with a higher PSNR get {more} right answers{UNCONFIRMED}."
+        );
+        (Tone::NotShown, text)
     } else {
         let text = "Within a condition, PSNR was not detected to tell right from wrong answers.";
-        (Tone::NotShown, text)
+        (Tone::NotShown, text.to_owned())
     };
     let ends = [
         ("auc", estimate.value),
@@ -66,7 +76,7 @@ pub(super) fn fidelity(findings: &Findings<'_>) -> Option<Sentence> {
     if let Some(example) = largest_gain(findings, fidelity) {
         detail += &example_text(&example, &mut numbers);
     }
-    Some(numbers.sentence("fidelity", tone, text.to_owned(), detail))
+    Some(numbers.sentence("fidelity", tone, text, detail))
 }
 
 /// The PSNR gain of an enhancer at one level, and its effect on the answers.

@@ -1,65 +1,59 @@
-//! Sentences about subjects that are excluded from all means: people, and models that answered fewer questions than others.
+//! Sentences about subjects that are excluded from the means about darkness: people, and models that answered fewer questions than others.
 
 use std::collections::BTreeSet;
 
 use super::lights::Topic;
+use super::sample::topic_in_light;
 use super::sentence::{Numbers, Sentence, Tone, capitalised};
 use crate::text::words::light;
 use crate::types::{AxisLevel, UnreadReason, Variant, View};
 use darkqa_score::choice::ParsingMode;
-use darkqa_score::comparisons::pool;
+use darkqa_score::comparisons::{PooledKind, pool};
 use darkqa_score::estimate::Estimate;
 use darkqa_score::findings::Findings;
 use darkqa_score::grid::Grid;
 use darkqa_score::model_in_condition::{ModelInCondition, is_reference};
 
-/// One sentence for each person and model excluded from means: its accuracy at L0 and at the darkest level, and the mean accuracy of the
-/// other models on the same questions.
+/// One sentence for each person, and for each model excluded from the mean cost of darkness in a light: its accuracy at L0 and at the
+/// darkest level, and the mean accuracy of the other models on the same questions.
 pub(super) fn apart(findings: &Findings<'_>) -> Vec<Sentence> {
-    let others = models_in_means(findings);
-    if others.is_empty() {
-        return Vec::new();
-    }
     let topics = Topic::all(findings);
-    excluded_names(findings)
-        .into_iter()
-        .filter_map(|name| {
-            topics
-                .iter()
-                .flat_map(|topic| &topic.lights)
-                .find_map(|variant| sentence(findings, name, &others, variant))
-        })
-        .collect()
-}
-
-/// Names of people and of models that a finding leaves out, in the order of the grid.
-fn excluded_names<'f>(findings: &'f Findings<'_>) -> Vec<&'f str> {
-    let left_out: BTreeSet<&str> = findings
-        .left_out
-        .iter()
-        .filter(|set| !set.is_more)
-        .flat_map(|set| &set.models)
-        .map(String::as_str)
-        .collect();
-    let listing = &findings.grid.listing;
     let mut names: Vec<&str> = findings
         .grid
         .subjects
         .iter()
         .filter(|subject| subject.view == Some(View::Image))
         .map(|subject| &*subject.model)
-        .filter(|name| listing.is_people(name) || left_out.contains(name))
         .collect();
     names.dedup();
     names
+        .into_iter()
+        .filter_map(|name| {
+            topics
+                .iter()
+                .flat_map(|topic| &topic.lights)
+                .filter(|variant| is_excluded(findings, name, variant))
+                .find_map(|variant| sentence(findings, name, variant))
+        })
+        .collect()
 }
 
-/// Models that are included in means.
-fn models_in_means<'f>(findings: &'f Findings<'_>) -> Vec<&'f str> {
-    let excluded = excluded_names(findings);
+/// True for people, and for models that the mean cost of darkness with a variant leaves out.
+fn is_excluded(findings: &Findings<'_>, name: &str, variant: &Variant) -> bool {
+    findings.grid.listing.is_people(name)
+        || findings.left_out.iter().any(|set| {
+            set.kind == PooledKind::Darkness
+                && set.variant == *variant
+                && !set.is_more
+                && set.models.iter().any(|model| model == name)
+        })
+}
+
+/// Models that the mean cost of darkness with a variant includes.
+fn models_in_mean<'f>(findings: &'f Findings<'_>, variant: &Variant) -> Vec<&'f str> {
     pool(&findings.grid)
         .into_iter()
-        .filter(|model| !excluded.contains(model) && !is_reference(model))
+        .filter(|model| !is_excluded(findings, model, variant) && !is_reference(model))
         .collect()
 }
 
@@ -130,14 +124,13 @@ fn accuracy(grid: &Grid<'_>, subject: usize, items: &[usize]) -> Option<f64> {
     (replies > 0).then(|| right as f64 / replies as f64)
 }
 
-/// Sentence about a subject at L0 and at the darkest level of a variant; `None` if it answered at neither.
-fn sentence(
-    findings: &Findings<'_>,
-    name: &str,
-    others: &[&str],
-    variant: &Variant,
-) -> Option<Sentence> {
+/// Sentence about a subject at L0 and at the darkest level of a variant; `None` if it answered at neither, or without other models.
+fn sentence(findings: &Findings<'_>, name: &str, variant: &Variant) -> Option<Sentence> {
     let grid = &findings.grid;
+    let others = models_in_mean(findings, variant);
+    if others.is_empty() {
+        return None;
+    }
     let darkest = grid
         .subjects
         .iter()
@@ -149,7 +142,7 @@ fn sentence(
     let accuracies: Vec<SameQuestionAccuracy> = [Some(AxisLevel::L0), darkest]
         .into_iter()
         .flatten()
-        .filter_map(|level| SameQuestionAccuracy::new(findings, name, others, level, variant))
+        .filter_map(|level| SameQuestionAccuracy::new(findings, name, &others, level, variant))
         .collect();
     if accuracies.is_empty() {
         return None;
@@ -184,7 +177,7 @@ fn sentence(
     } else {
         String::new()
     };
-    let who = match others {
+    let who = match &others[..] {
         [one] => (*one).to_owned(),
         several => format!(
             "the mean of {} models",
@@ -200,11 +193,12 @@ fn sentence(
         capitalised(&place),
         own_shares.join(", ")
     );
-    let people = if grid.listing.is_people(name) {
-        "people; "
+    let details = details.join("; ");
+    let detail = if grid.listing.is_people(name) {
+        format!("people; {details}; in no mean")
     } else {
-        ""
+        let topic = topic_in_light(PooledKind::Darkness, variant, None);
+        format!("{details}; in no mean about {topic}")
     };
-    let detail = format!("{people}{}; in no mean", details.join("; "));
     Some(numbers.sentence("apart", Tone::Note, text, detail))
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::format::format_alone;
-use super::pooled::{UNCONFIRMED, detail, is_unconfirmed, runs, with_verdict};
+use super::pooled::{detail, runs, unconfirmed, with_verdict};
 use super::sentence::{Numbers, Sentence, Tone, capitalised, level_runs};
 use crate::text::words::family as family_name;
 use crate::types::{Axis, AxisLevel, Variant};
@@ -92,18 +92,21 @@ pub(super) fn untouched(findings: &Findings<'_>) -> Option<Sentence> {
         ),
         // One sentence for all topics reports that no verdict is possible.
         Claim::Impossible => return None,
-        _ if is_unconfirmed(finding) => {
-            let difference = finding.strict.difference.value;
-            let verb = if difference < 0.0 { "cost" } else { "add" };
-            format!(
-                "At L0 images {verb} {} points{}{UNCONFIRMED}: {with} % with them, {without} % without.",
-                numbers.size("effect", difference),
-                against(finding)
-            )
+        _ => {
+            if let Some(unconfirmed) = unconfirmed(finding.claim(), finding.strict.difference) {
+                let difference = finding.strict.difference.value;
+                let verb = if difference < 0.0 { "cost" } else { "add" };
+                format!(
+                    "At L0 images {verb} {} points{}{unconfirmed}: {with} % with them, {without} % without.",
+                    numbers.size("effect", difference),
+                    against(finding)
+                )
+            } else {
+                format!(
+                    "No gain by images was detected at L0: {with} % with them, {without} % without."
+                )
+            }
         }
-        _ => format!(
-            "No gain by images was detected at L0: {with} % with them, {without} % without."
-        ),
     };
     let detail = detail(finding, &mut numbers, "");
     Some(numbers.sentence("images", Tone::from(finding.claim()), text, detail))

@@ -3,8 +3,7 @@
 use super::format::format_alone;
 use super::lights::{Topic, findings_of_kind, mean_findings};
 use super::pooled::{
-    UNCONFIRMED, detail, is_unconfirmed, lower_or_higher, mean_levels, reservation, runs,
-    with_verdict,
+    detail, lower_or_higher, mean_levels, reservation, runs, unconfirmed, with_verdict,
 };
 use super::sample::WIDE;
 use super::sentence::{Numbers, Sentence, Tone, capitalised};
@@ -159,9 +158,11 @@ pub(super) fn with_variant(
             if let Some(format) = format_alone(levels, unit) {
                 return Some(format);
             }
-            let text = if is_unconfirmed(darkest) {
+            let text = if let Some(unconfirmed) =
+                unconfirmed(darkest.claim(), darkest.strict.difference)
+            {
                 format!(
-                    "at {} accuracy is {} points {} than at L0{UNCONFIRMED}.",
+                    "at {} accuracy is {} points {} than at L0{unconfirmed}.",
                     darkest.level,
                     numbers.size("effect", size),
                     lower_or_higher(size),

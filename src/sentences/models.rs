@@ -3,6 +3,7 @@
 use std::cmp::Ordering;
 
 use super::lights::Topic;
+use super::sample::listed;
 use super::sentence::{Numbers, Sentence, Tone, capitalised, level_runs};
 use crate::text::words::family;
 use crate::types::Variant;
@@ -11,8 +12,8 @@ use darkqa_score::comparisons::{BestInTheDark, Claim, Crossing, PooledFinding, P
 use darkqa_score::findings::Findings;
 use darkqa_score::significance::Significance;
 
-/// The model with the highest mean accuracy in the dark, and the models that it was not detected to be better than. If the order of the two
-/// leading models changes with the level, the sentence reports that change instead.
+/// The model with the highest mean accuracy in the dark, and the models that it was not detected to be better than; or all models that
+/// share that accuracy. If the order of the two leading models changes with the level, the sentence reports that change instead.
 pub(super) fn best(findings: &Findings<'_>) -> Option<Sentence> {
     let best = findings.best.as_ref().filter(|best| best.is_possible())?;
     let lenient = findings.lenient_best.as_ref()?;
@@ -21,6 +22,7 @@ pub(super) fn best(findings: &Findings<'_>) -> Option<Sentence> {
     let over = dark_levels(best);
     let axis = best.variant.kind.map_or(Axis::LIGHT, Kind::axis);
     let place = axis.place;
+    let leaders = leaders(best);
     let is_same = lenient.is_detected() && lenient.leader().model == leader.model;
     let (tone, text) = if let Some(crossing) = crossing(best, lenient) {
         let ((before, last), (after, first)) = (&crossing.before, &crossing.after);
@@ -29,6 +31,10 @@ pub(super) fn best(findings: &Findings<'_>) -> Option<Sentence> {
     } else if best.is_detected() && is_same {
         let text = format!("{} sees best {place} ({over}).", leader.model);
         (Tone::Better, text)
+    } else if leaders.len() > 1 {
+        let models = listed(&leaders);
+        let text = format!("{models} share the highest mean accuracy {place} ({over}).");
+        (Tone::NotShown, text)
     } else {
         let others = match &best.not_shown_better_than[..] {
             [] => "the others".to_owned(),
@@ -86,6 +92,19 @@ pub(super) fn best(findings: &Findings<'_>) -> Option<Sentence> {
         None => sentence,
     })
 }
+
+/// The models with the highest mean accuracy in the dark: the leader, and those with the same accuracy.
+fn leaders(best: &BestInTheDark) -> Vec<String> {
+    let highest = best.leader().mean.value;
+    best.models
+        .iter()
+        .filter(|other| highest - other.mean.value < ROUNDING)
+        .map(|other| other.model.clone())
+        .collect()
+}
+
+/// Maximum rounding error of equal means (chosen).
+const ROUNDING: f64 = 1e-9;
 
 /// The change of order of two models, if it is detected in both parsings.
 fn crossing<'b>(best: &'b BestInTheDark, lenient: &BestInTheDark) -> Option<&'b Crossing> {

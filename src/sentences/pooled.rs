@@ -5,6 +5,7 @@ use super::sentence::{Numbers, Sentence, Tone, level_runs, models};
 use crate::types::AxisLevel;
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::{Claim, PooledFinding};
+use darkqa_score::estimate::Estimate;
 use darkqa_score::model_in_condition;
 use darkqa_score::significance::Significance;
 
@@ -144,10 +145,10 @@ pub(super) fn noise(
         return vec![format];
     }
     let mut numbers = Numbers::new(unit);
-    let text = if is_unconfirmed(largest) {
+    let text = if let Some(unconfirmed) = unconfirmed(largest.claim(), largest.strict.difference) {
         let difference = largest.strict.difference.value;
         format!(
-            "With noise, accuracy is {} points {} than by the exposure drop alone ({}){UNCONFIRMED}.",
+            "With noise, accuracy is {} points {} than by the exposure drop alone ({}){unconfirmed}.",
             numbers.size("effect", difference),
             lower_or_higher(difference),
             largest.level
@@ -232,12 +233,12 @@ fn no_effect(
     let mut numbers = Numbers::new(unit);
     numbers.about(name);
     let at = runs(undetected, levels);
-    let text = if is_unconfirmed(largest) {
+    let text = if let Some(unconfirmed) = unconfirmed(largest.claim(), largest.strict.difference) {
         let difference = largest.strict.difference.value;
         let up_to = if undetected.len() > 1 { "up to " } else { "" };
         let size = numbers.size("effect", difference);
         let word = lower_or_higher(difference);
-        format!("{name} at {at}: accuracy {up_to}{size} points {word}{UNCONFIRMED}.")
+        format!("{name} at {at}: accuracy {up_to}{size} points {word}{unconfirmed}.")
     } else {
         format!("{name} at {at}: no effect detected.")
     };
@@ -255,7 +256,7 @@ fn is_observer(finding: &PooledFinding) -> bool {
     matches!(&finding.models[..], [one] if model_in_condition::is_observer(one))
 }
 
-/// The end of a sentence about an effect that [`is_unconfirmed`].
+/// The end of a sentence about an effect that only the interval or the uncorrected test detects.
 pub(super) const UNCONFIRMED: &str = ", unconfirmed after correction for all tests";
 
 /// How an accuracy with this difference compares with the other one.
@@ -263,12 +264,15 @@ pub(super) fn lower_or_higher(difference: f64) -> &'static str {
     if difference < 0.0 { "lower" } else { "higher" }
 }
 
-/// True if nothing is detected although the interval excludes 0. The sentence then reports the effect, because "nothing was detected" next
-/// to such an interval would look contradictory.
-pub(super) fn is_unconfirmed(finding: &PooledFinding) -> bool {
-    let difference = finding.strict.difference;
+/// The end of a sentence about an effect that does not count as detected although its interval excludes 0; `None` for other findings. The
+/// sentence reports such an effect, because "nothing was detected" next to the interval would look contradictory.
+pub(super) fn unconfirmed(claim: Claim, difference: Estimate) -> Option<&'static str> {
     let excludes_zero = difference.low > 0.0 || difference.high < 0.0;
-    excludes_zero && matches!(finding.claim(), Claim::Open | Claim::InOwnSet)
+    match claim {
+        Claim::Open | Claim::InOwnSet if excludes_zero => Some(UNCONFIRMED),
+        Claim::StrictOnly(_) => Some(", in the strict parsing alone"),
+        _ => None,
+    }
 }
 
 /// The reason why a finding does not count as detected, although its own test or its interval detects it; empty for other findings.

@@ -1,5 +1,6 @@
 //! Sentences about photographs in the dark: their cost, their difference from synthetic images, and the effect of enhancers.
 
+use super::pooled::{lower_or_higher, unconfirmed};
 use super::sentence::{Numbers, Sentence, Tone};
 use crate::text::words::light;
 use darkqa_score::cluster::ClusterUnit;
@@ -60,7 +61,12 @@ fn cost(row: &Comparison, pair: &PairDarkness, unit: ClusterUnit) -> Sentence {
             let size = numbers.size("effect", row.strict.paired.difference.value);
             format!("{place}, {model} {does} {size} points against the light.")
         }
-        _ => format!("{place}, no loss of {model} is shown."),
+        _ => match unconfirmed_size(row, &mut numbers) {
+            Some((size, end)) => {
+                format!("{place}, accuracy of {model} is {size} than in the light{end}.")
+            }
+            None => format!("{place}, no loss of {model} is shown."),
+        },
     };
     sentence("real darkness", row, numbers, text)
 }
@@ -81,9 +87,14 @@ fn against_synthetic(row: &Comparison, unit: ClusterUnit) -> Sentence {
             let size = numbers.size("effect", size);
             format!("{name} is {harder} for {model} than {synthetic} ({level}), by {size} points.")
         }
-        _ => format!(
-            "It is not shown that {name} is harder or easier for {model} than {synthetic} ({level})."
-        ),
+        _ => match unconfirmed_size(row, &mut numbers) {
+            Some((size, end)) => format!(
+                "With {name}, accuracy of {model} is {size} than {synthetic} ({level}){end}."
+            ),
+            None => format!(
+                "It is not shown that {name} is harder or easier for {model} than {synthetic} ({level})."
+            ),
+        },
     };
     sentence("real against synthetic", row, numbers, text)
 }
@@ -106,9 +117,23 @@ fn enhanced(row: &Comparison, unit: ClusterUnit) -> Sentence {
             let size = numbers.size("effect", row.strict.paired.difference.value);
             format!("{name} {does} {model} with {raw}, by {size} points.")
         }
-        _ => format!("Neither help nor harm of {name} is shown for {model} with {raw}."),
+        _ => match unconfirmed_size(row, &mut numbers) {
+            Some((size, end)) => {
+                format!("{name} with {raw}: accuracy of {model} {size}{end}.")
+            }
+            None => format!("Neither help nor harm of {name} is shown for {model} with {raw}."),
+        },
     };
     sentence("real enhanced", row, numbers, text)
+}
+
+/// An effect that is not detected although its interval excludes 0, as `5.0 points lower`, and the end of its sentence.
+fn unconfirmed_size(row: &Comparison, numbers: &mut Numbers) -> Option<(String, &'static str)> {
+    let difference = row.strict.paired.difference;
+    let end = unconfirmed(row.claim(), difference)?;
+    let size = numbers.size("effect", difference.value);
+    let word = lower_or_higher(difference.value);
+    Some((format!("{size} points {word}"), end))
 }
 
 /// The verdict in both parsings and after the correction over all sentences.

@@ -22,6 +22,19 @@ fn topic(kind: PooledKind, variant: &Variant, enhancer: Option<&EnhancerName>) -
     }
 }
 
+/// The subject of findings of a kind with a variant, as `darkness (with noise)`.
+pub(super) fn topic_in_light(
+    kind: PooledKind,
+    variant: &Variant,
+    enhancer: Option<&EnhancerName>,
+) -> String {
+    format!(
+        "{} ({})",
+        topic(kind, variant, enhancer),
+        light(variant, None)
+    )
+}
+
 /// True if no finding of a set can have a verdict, because there are too few clusters for a small corrected p-value.
 pub(super) fn is_impossible(set: &[&PooledFinding]) -> bool {
     set.iter()
@@ -130,11 +143,7 @@ pub(crate) fn left_out(findings: &Findings<'_>) -> Vec<Sentence> {
         if matches!(set.kind, PooledKind::Hallucination(_)) {
             continue;
         }
-        let about = format!(
-            "{} ({})",
-            topic(set.kind, &set.variant, set.enhancer.as_ref()),
-            light(&set.variant, None)
-        );
+        let about = topic_in_light(set.kind, &set.variant, set.enhancer.as_ref());
         let same = grouped.iter_mut().find(|(other, _)| {
             runs(other) == runs(set) && other.models == set.models && other.items == set.items
         });

@@ -329,7 +329,7 @@ fn level_effects(
         ),
         (None, None) => (
             Tone::NotShown,
-            format!("No effect of {enhancer} on answers of {model} was detected ({variant})."),
+            format!("{enhancer} has no detected effect on answers of {model} ({variant})."),
         ),
     }
 }
@@ -353,7 +353,7 @@ fn photograph_effects(enhancer: &EnhancerName, model: &str, change: Claim) -> (T
         _ => (
             Tone::NotShown,
             format!(
-                "No effect of {enhancer} on answers of {model} to these photographs was detected."
+                "{enhancer} has no detected effect on answers of {model} to these photographs."
             ),
         ),
     }

@@ -19,6 +19,19 @@ fn format_changes_do_not_decide_the_best_model() {
 }
 
 #[test]
+fn equal_leaders_share_the_highest_accuracy() {
+    let first = scripted("first", &SEEING);
+    let second = scripted("second", &SEEING);
+    let worse = scripted("worse", &[("L0", 90), ("L3-noise", 10), ("L5-noise", 10)]);
+    let best = of_kind(&sentences_about(&[worse, first, second].concat()), "best");
+    assert!(
+        best[0].starts_with("· first and second share the highest mean accuracy in the dark ("),
+        "{best:?}"
+    );
+    assert!(best[0].contains("; 0.0 ["), "{best:?}");
+}
+
+#[test]
 fn best_model_is_chosen_at_dark_levels() {
     let bright = scripted("bright", &at_noise_levels([99, 97, 97, 45, 35, 35]));
     let steady = scripted("steady", &at_noise_levels([62, 58, 59, 61, 50, 51]));

@@ -4,16 +4,20 @@ mod below_blind;
 mod best;
 mod confidence;
 mod hallucination;
+mod real;
 mod records;
 mod simulation;
 
 use super::sentence::{Sentence, level_runs};
-use super::{below_blind as below, darkness, pooled, sample};
+use super::{answers, below_blind as below, darkness, pooled, sample};
 use crate::types::degradations::Kind;
 use crate::types::{AxisLevel, EnhancerName, Severity, Variant};
-use darkqa_score::cluster::ClusterUnit;
+use darkqa_score::auc::Auc;
+use darkqa_score::cluster::{ClusterUnit, FrameTies};
 use darkqa_score::comparisons::{PooledDifference, PooledFinding, PooledKind};
 use darkqa_score::estimate::Estimate;
+use darkqa_score::findings::Findings;
+use darkqa_score::photographs::FidelityFindings;
 use darkqa_score::significance::Significance::{self, Better, NotShown, TooFewClusters, Worse};
 use darkqa_score::significance::SwapMethod;
 
@@ -235,6 +239,55 @@ fn undetected_effects_may_be_unconfirmed() {
         said.starts_with("· With noise, accuracy is 5.0 points higher than by the exposure drop alone (L1), unconfirmed after"),
         "{said}"
     );
+}
+
+#[test]
+fn effects_of_strict_parsing_alone_are_named() {
+    let mut found = finding(PooledKind::Enhancer, 1, 0.085, Better);
+    found.lenient = parsed(PooledKind::Enhancer, 0.05, NotShown);
+    let said = checked(&pooled::enhancers(&[&found], &[], ClusterUnit::Scene)[0]);
+    assert!(
+        said.starts_with(
+            "· lift at L1: accuracy 8.5 points higher, in the strict parsing alone. ("
+        ),
+        "{said}"
+    );
+}
+
+#[test]
+fn unconfirmed_fidelity_names_its_direction() {
+    let low = fidelity_sentence([0.11, 0.02, 0.47]);
+    assert!(
+        low.starts_with("· Within a condition, images with a higher PSNR get fewer right answers, unconfirmed after correction for all tests. ("),
+        "{low}"
+    );
+    let none = fidelity_sentence([0.11, 0.02, 0.53]);
+    assert!(
+        none.starts_with(
+            "· Within a condition, PSNR was not detected to tell right from wrong answers. ("
+        ),
+        "{none}"
+    );
+}
+
+/// The sentence about an AUC of PSNR with this interval, not detected after the correction.
+fn fidelity_sentence([value, low, high]: [f64; 3]) -> String {
+    let trials = Vec::new().into_iter().collect();
+    let mut findings = Findings::new(&trials, &FrameTies::default(), [], &[]);
+    let estimate = Estimate {
+        value,
+        low,
+        high,
+        n: 702,
+    };
+    findings.fidelity = Some(FidelityFindings {
+        models: vec!["m".to_owned()],
+        conditions: Vec::new(),
+        within: [Some(Auc { estimate, p: 0.04 }), None],
+        p_report: Some(0.508),
+        between: [None, None],
+    });
+    checked(&answers::fidelity(&findings).unwrap())
 }
 
 /// Findings about L1–L5 without a verdict, and the mean of L4–L5 with one.

@@ -286,6 +286,33 @@ fn models_without_some_levels_are_left_out() {
             ),
         "{apart:?}"
     );
+    assert!(
+        apart[0].ends_with("; in no mean about darkness (with noise))"),
+        "{apart:?}"
+    );
+}
+
+#[test]
+fn models_lacking_an_enhancer_stay_in_darkness() {
+    let raw = [("L0", 1.0), ("L3-noise", 0.5), ("L5-noise", 0.0)];
+    let enhanced = [("L3-noise+lift", 1.0), ("L5-noise+lift", 1.0)];
+    let both = [
+        asked("a", FRAMES, &[&raw[..], &enhanced].concat()),
+        asked("b", FRAMES, &[&raw[..], &enhanced[..1]].concat()),
+    ]
+    .concat();
+    let both = sentences_about(&both);
+    let darkness = of_kind(&both, "darkness");
+    assert!(
+        darkness[0].contains("(mean of these 2 models: "),
+        "{darkness:?}"
+    );
+    let left_out = of_kind(&both, "left out");
+    assert!(
+        left_out[0].ends_with("(in no mean about lift (with noise))"),
+        "{left_out:?}"
+    );
+    assert!(of_kind(&both, "apart").is_empty());
 }
 
 #[test]
