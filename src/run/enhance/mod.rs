@@ -47,7 +47,7 @@ enum EnhanceForm {
     /// Run the model on dark versions of images with each convention that could be meant, and propose a sidecar
     ///
     /// Writes doctor.html and doctor.png into the folder of --out, with the sidecar that would repair it. Ends with 0 if there is one
-    /// plausible convention, else with 1.
+    /// plausible convention and the model takes the sizes of the images, else with 1.
     Doctor(DoctorArgs),
     /// Print the presets of published enhancers, each with repository, licence, conventions and the command that exports it
     Presets,
