@@ -236,11 +236,17 @@ fn enhance_images(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome> {
     drop(bar);
     tally.warn();
     refusals.log();
+    let used = enhancer.usage().note();
+    let sizes = if used.size_counts.whole < used.size_counts.images {
+        used.sizes + "\n"
+    } else {
+        String::new()
+    };
     Ok(Outcome::wrote(
         out,
         Outcome::complete_if(counts.failed == 0),
         format!(
-            "{}: {} made by {}{}{}\n",
+            "{}: {} made by {}{}{}\n{sizes}",
             out.display(),
             counts.written,
             enhancer.name(),

@@ -407,3 +407,27 @@ fn doctor_names_sizes_that_fail() {
     picture: doctor/doctor.png
     "#);
 }
+
+#[test]
+fn enhance_prints_adapted_sizes() {
+    let bench = Bench::new();
+    bench.rooms("rooms", 2, "64x48");
+    let graph = onnx::enhancer_in_ranges(UNIT, UNIT);
+    onnx::of_size(&graph, 1, [32, 32]).write(&bench.path(""), "fixed.onnx");
+    bench.file(
+        "fixed.onnx.toml",
+        "range_in = \"0..1\"\nrange_out = \"0..1\"\n",
+    );
+    let called = bench.call(&words("enhance fixed.onnx rooms --out tiles"));
+    insta::assert_snapshot!(called.stdout, @"
+    tiles: 2 made by fixed
+    2 images: in tiles of 32 × 32 with 8 px context (no difference at seams)
+    ");
+    let called = bench.call(&words(
+        "enhance fixed.onnx rooms --out resized --llie-options resize",
+    ));
+    insta::assert_snapshot!(called.stdout, @"
+    resized: 2 made by fixed
+    2 images: resized to 32 × 32 and back
+    ");
+}
