@@ -374,6 +374,33 @@ fn images(root: &Root) -> Result<BTreeMap<FrameId, ImageSource>> {
     Ok(sources)
 }
 
+/// Warns if a folder in this one has images: they are not read. Links out of the folder and hidden folders are left out.
+pub(super) fn warn_of_subfolders(folder: &Path, further: &[PathBuf]) -> Result<()> {
+    let root = Root::new(folder, further)?;
+    let inner: Vec<PathBuf> = entries(folder)?
+        .into_iter()
+        .filter(|path| root.locate(path) == Location::Inside && !is_hidden(path))
+        .filter(|path| has_images(path))
+        .collect();
+    if let Some(first) = inner.first() {
+        let count = match inner.len() {
+            1 => "the images of 1 folder in it are not read:".to_owned(),
+            n => format!("the images of {n} folders in it are not read, as"),
+        };
+        tracing::warn!(
+            "{}: {count} {}; name such a folder, too, to read them",
+            folder.display(),
+            first.display()
+        );
+    }
+    Ok(())
+}
+
+fn is_hidden(path: &Path) -> bool {
+    path.file_name()
+        .is_some_and(|name| name.to_string_lossy().starts_with('.'))
+}
+
 /// True if the path is a folder with an image directly in it.
 fn has_images(folder: &Path) -> bool {
     entries(folder).is_ok_and(|inner| inner.iter().any(|path| is_image(path)))

@@ -230,7 +230,11 @@ impl Dataset {
     /// read.
     pub fn from_images(path: &Path, further: &[PathBuf]) -> Result<Self> {
         let sources = if path.is_dir() {
-            frames::sources(path, further, MissingFiles::Refuse)?
+            let sources = frames::sources(path, further, MissingFiles::Refuse)?;
+            if !path.join(frames::FRAMES).exists() {
+                frames::warn_of_subfolders(path, further)?;
+            }
+            sources
         } else {
             frames::image(path)?
         };

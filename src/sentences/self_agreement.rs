@@ -329,7 +329,7 @@ fn level_effects(
         ),
         (None, None) => (
             Tone::NotShown,
-            format!("{enhancer} has no detected effect on answers of {model} ({variant})."),
+            format!("{enhancer}: no effect on answers of {model} was detected ({variant})."),
         ),
     }
 }
@@ -353,7 +353,7 @@ fn photograph_effects(enhancer: &EnhancerName, model: &str, change: Claim) -> (T
         _ => (
             Tone::NotShown,
             format!(
-                "{enhancer} has no detected effect on answers of {model} to these photographs."
+                "{enhancer}: no effect on answers of {model} to these photographs was detected."
             ),
         ),
     }
@@ -385,4 +385,25 @@ fn cannot_tell_shares(found: &SelfAgreement<'_>, model: &str) -> Option<Sentence
     let n = numbers.count("n", share.n);
     let detail = format!("[{low}, {high}] % at {level}, n = {n}");
     Some(numbers.sentence("cannot_tell", Tone::Note, text, detail))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The summary of a report joins sentences with semicolons.
+    #[test]
+    fn missing_effect_names_enhancer_first() {
+        let lift = EnhancerName::new("lift").unwrap();
+        let (_, text) = level_effects(&lift, "m", "with noise", None, None);
+        assert_eq!(
+            text,
+            "lift: no effect on answers of m was detected (with noise)."
+        );
+        let (_, text) = photograph_effects(&lift, "m", Claim::Open);
+        assert_eq!(
+            text,
+            "lift: no effect on answers of m to these photographs was detected."
+        );
+    }
 }

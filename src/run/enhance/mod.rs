@@ -47,7 +47,7 @@ enum EnhanceForm {
     /// Run the model on dark versions of images with each convention that could be meant, and propose a sidecar
     ///
     /// Writes doctor.html and doctor.png into the folder of --out, with the sidecar that would repair it. Ends with 0 if there is one
-    /// plausible convention, else with 1.
+    /// plausible convention and the model takes the sizes of the images, else with 1.
     Doctor(DoctorArgs),
     /// Print the presets of published enhancers, each with repository, licence, conventions and the command that exports it
     Presets,
@@ -236,11 +236,17 @@ fn enhance_images(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome> {
     drop(bar);
     tally.warn();
     refusals.log();
+    let used = enhancer.usage().note();
+    let sizes = if used.size_counts.whole < used.size_counts.images {
+        used.sizes + "\n"
+    } else {
+        String::new()
+    };
     Ok(Outcome::wrote(
         out,
         Outcome::complete_if(counts.failed == 0),
         format!(
-            "{}: {} made by {}{}{}\n",
+            "{}: {} made by {}{}{}\n{sizes}",
             out.display(),
             counts.written,
             enhancer.name(),

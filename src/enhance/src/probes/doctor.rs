@@ -5,6 +5,7 @@
 mod proposal;
 
 use std::collections::BTreeSet;
+use std::fmt::Write as _;
 
 use super::expressions::{ExpressionTrial, OutputKind};
 use super::plausible::{Facts, UnclampedImage};
@@ -33,9 +34,9 @@ pub struct Examination {
     pub proposal: Vec<ProposedLine>,
     /// Reason for the proposal, or for its absence.
     pub conclusion: String,
-    /// How the sizes of the frames were handled, or why the model failed.
+    /// How the sizes of the frames were handled, or why the model failed; empty if the proposal changes that.
     pub sizes: String,
-    /// Whether exactly one convention is plausible.
+    /// Whether exactly one convention is plausible and the model takes the frames.
     pub settled: Settled,
 }
 
@@ -74,15 +75,17 @@ impl Enhancer {
     /// Runs the model on dark frames in each possible convention.
     ///
     /// # Errors
-    /// If the model accepts none of the sizes of the probe.
+    /// If the model accepts neither the frames nor any size of the probe.
     pub fn examine(&mut self, dark: &[Rgb], image: ImageOutput) -> Result<Examination> {
         let sizes = self.try_sizes(dark);
         let order = self.other_order();
-        let trials = self.trials_of_all(dark)?.ok_or_else(|| {
-            self.error(format!(
+        let Some(trials) = self.trials_of_all(dark)? else {
+            // A failure on the frames themselves has its own remedy.
+            sizes?;
+            return Err(self.error(format!(
                 "fails at 144 × 96, 160 × 120 and 128 × 128; {ADD} the sizes that it takes: `multiple = N` or `fixed = [WIDTH, HEIGHT]`"
-            ))
-        })?;
+            )));
+        };
         let Trials {
             frames,
             probes: [probe, swapped],
@@ -128,6 +131,20 @@ impl Enhancer {
                 others.extend(expressions);
             }
         }
+        let sizes = match sizes {
+            Ok(summary) => summary,
+            Err(problem) if probe.plausible().contains(&probe.usual) => {
+                found.settled = Settled::No;
+                let _ = write!(
+                    found.conclusion,
+                    " But not all images can be enhanced: {problem}"
+                );
+                problem.to_string()
+            }
+            // Caused by the present ranges, which the proposal replaces.
+            Err(_) if !found.lines.is_empty() => String::new(),
+            Err(problem) => problem.to_string(),
+        };
         let convention = self.convention();
         let is_stated = convention.color.is_some()
             || convention.color_out.is_some()
@@ -203,17 +220,15 @@ impl Enhancer {
         })
     }
 
-    /// Runs the model on one frame of each size, to find the sizes that it accepts. Returns a summary of the sizes, or the error.
-    fn try_sizes(&mut self, frames: &[Rgb]) -> String {
+    /// Runs the model on one frame of each size, to find the sizes that it accepts. Returns a summary of the sizes.
+    fn try_sizes(&mut self, frames: &[Rgb]) -> Result<String> {
         let mut tried = BTreeSet::new();
         for frame in frames {
-            if tried.insert([frame.height(), frame.width()])
-                && let Err(problem) = self.enhance(frame)
-            {
-                return problem.to_string();
+            if tried.insert([frame.height(), frame.width()]) {
+                self.enhance(frame)?;
             }
         }
-        self.usage().note().sizes
+        Ok(self.usage().note().sizes)
     }
 
     /// Sidecar line for the accepted sizes, if they were found by trial.

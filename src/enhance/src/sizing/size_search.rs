@@ -162,9 +162,13 @@ pub(crate) fn sizes_not_found(failure: &RunFailure, search: &SizeSearch) -> Stri
         .map(ToString::to_string)
         .collect::<Vec<_>>()
         .join(", ");
-    format!(
-        "{words}. The multiples {tried}{traced} fail, too; export it with dynamic_axes and without int(x.shape[..]) in its code, or for the size of the images"
-    )
+    // The message about an output of another size has its own advice.
+    let advice = if matches!(failure, RunFailure::WrongSize { .. }) {
+        ""
+    } else {
+        "; export it with dynamic_axes and without int(x.shape[..]) in its code, or for the size of the images"
+    };
+    format!("{words}. The multiples {tried}{traced} fail, too{advice}")
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use std::process::Command;
 
 use super::{image, map};
 use crate::support::onnx;
-use crate::support::run::PROGRAM;
+use crate::support::run::{Bench, PROGRAM, words};
 use crate::support::snapshot::{lines_with, redacted};
 use crate::support::table::check_rows;
 
@@ -103,4 +103,21 @@ fn the_command_enhances_files_and_folders() {
         let (code, _, err) = call(args);
         assert_eq!((code, err.lines().count()), (2, 1), "{err}");
     });
+}
+
+#[test]
+fn images_in_subfolders_are_reported() {
+    let bench = Bench::new();
+    for name in ["a.png", "sub/b.png", ".hidden/c.png"] {
+        let path = bench.path("photos").join(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        image::RgbImage::new(8, 8).save(path).unwrap();
+    }
+    let called = bench.call(&words(
+        "synthesize photos --out dark --levels L1 --variant ev",
+    ));
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 0
+     WARN photos: the images of 1 folder in it are not read: photos/sub; name such a folder, too, to read them
+    ");
 }

@@ -385,3 +385,49 @@ fn doctor_proposes_sidecar_that_mends_model() {
         }
     }
 }
+
+#[test]
+fn doctor_names_sizes_that_fail() {
+    let bench = Bench::new();
+    bench.rooms("rooms", 2, "64x48");
+    onnx::halved().write(&bench.path(""), "halved.onnx");
+    onnx::of_size(&onnx::mean_added(), 1, [32, 32]).write(&bench.path(""), "fixed.onnx");
+    let called = bench.call(&words("enhance doctor halved.onnx rooms --out doctor"));
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 2
+    error: halved.onnx: gave an image of 32 × 24 for one of 64 × 48, but both must have the same size: it makes
+        the image smaller; export it with the upsampling to the size of the input. The multiples 4, 8, 12, 14, 16,
+        20, 24, 28, 32, 40, 48, 56, 64, 96, 112, 128 fail, too
+    ");
+    let called = bench.call(&words("enhance doctor fixed.onnx rooms --out doctor"));
+    assert_eq!(called.code, Some(1));
+    insta::assert_snapshot!(called.stdout, @r#"
+    With 0..1 in and 0..1 out its images are plausible; a run assumes these usual ranges and warns. They are with 0..255 in and 0..255 out, too; compare the page with the model's own examples. But not all images can be enhanced: fixed.onnx: takes only images of 32 × 32, but the image has 64 × 48; padding or tiling would change it, because a pixel depends on others 16 pixels away, which is more than a quarter of the size. Export it for any size: `torch.onnx.export(..., input_names=["input"], output_names=["output"], dynamic_axes={"input": {2: "h", 3: "w"}, "output": {2: "h", 3: "w"}})`, or for images of 64 × 48; or resize each image and back with --llie-options resize, which blurs it and changes its brightness by some codes of 255
+    page: doctor/doctor.html
+    picture: doctor/doctor.png
+    "#);
+}
+
+#[test]
+fn enhance_prints_adapted_sizes() {
+    let bench = Bench::new();
+    bench.rooms("rooms", 2, "64x48");
+    let graph = onnx::enhancer_in_ranges(UNIT, UNIT);
+    onnx::of_size(&graph, 1, [32, 32]).write(&bench.path(""), "fixed.onnx");
+    bench.file(
+        "fixed.onnx.toml",
+        "range_in = \"0..1\"\nrange_out = \"0..1\"\n",
+    );
+    let called = bench.call(&words("enhance fixed.onnx rooms --out tiles"));
+    insta::assert_snapshot!(called.stdout, @"
+    tiles: 2 made by fixed
+    2 images: in tiles of 32 × 32 with 8 px context (no difference at seams)
+    ");
+    let called = bench.call(&words(
+        "enhance fixed.onnx rooms --out resized --llie-options resize",
+    ));
+    insta::assert_snapshot!(called.stdout, @"
+    resized: 2 made by fixed
+    2 images: resized to 32 × 32 and back
+    ");
+}
