@@ -154,7 +154,10 @@ pub(super) fn cost_text<'t, D: Detail + 't>(
     };
     let note = match unknown {
         0 => String::new(),
-        n => format!("; {n} replies without a known price or usage"),
+        n => format!(
+            "; {} without a known price or usage",
+            words::plural(n, "reply", "replies")
+        ),
     };
     let (source, all) = (run.source(), money(dollars + lost_dollars));
     Ok((counted > 0 || attempts > 0).then(|| format!("{all} at {source}{lost}{note}")))
