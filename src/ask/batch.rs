@@ -32,18 +32,28 @@ pub(crate) struct BatchLine {
 }
 
 impl BatchLine {
-    /// Parses a line of the user's own file; `None` if it has another form. No key is known without a server, so no secret is removed. For
-    /// lines from a server use [`BatchServer::line`](super::batch_api::BatchServer::line).
+    /// Parses a line of the user's own file; `None` if it has another form, as input files and the results of other interfaces have. No key
+    /// is known without a server, so no secret is removed. For lines from a server use
+    /// [`BatchServer::line`](super::batch_api::BatchServer::line).
     #[must_use]
     pub(crate) fn read(line: &str) -> Option<Self> {
-        Self::read_without_secrets(line, &Scrub::default())
+        let line = parse(line.trim_start_matches('\u{feff}')).ok()?;
+        let has_result = ["response", "error"]
+            .iter()
+            .any(|field| line.get(field).is_some());
+        has_result
+            .then(|| Self::from_json(&line, &Scrub::default()))
+            .flatten()
     }
 
     /// Parses a line, and removes secrets from the reply or the failure; `None` if the line has another form.
     pub(super) fn read_without_secrets(line: &str, scrub: &Scrub) -> Option<Self> {
-        let line = parse(line).ok()?;
+        Self::from_json(&parse(line).ok()?, scrub)
+    }
+
+    fn from_json(line: &Value, scrub: &Scrub) -> Option<Self> {
         let id = line.get("custom_id")?.as_str()?.to_owned();
-        let result = result(&line, scrub).map(|reply| without_secrets(reply, scrub));
+        let result = result(line, scrub).map(|reply| without_secrets(reply, scrub));
         let charged = match line
             .get("response")
             .and_then(|response| response.get("body"))
@@ -55,7 +65,7 @@ impl BatchLine {
             id,
             charged,
             result,
-            refusal: refusal(&line),
+            refusal: refusal(line),
         })
     }
 }
@@ -217,15 +227,35 @@ mod tests {
                 FailureKind::Response,
                 "no choices",
             ),
-            (r#"{"custom_id":"k"}"#, FailureKind::Response, "neither"),
+            (
+                r#"{"custom_id":"k","response":null}"#,
+                FailureKind::Response,
+                "neither",
+            ),
         ] {
             let failure = read_line(line).result.unwrap_err();
             assert_eq!(failure.kind, kind, "{line}");
             assert!(failure.message.contains(message), "{}", failure.message);
         }
-        for wrong in ["", "{}", r#"{"custom_id":7}"#, "[1]"] {
+        for wrong in ["", "{}", r#"{"custom_id":7,"error":null}"#, "[1]"] {
             assert_eq!(BatchLine::read(wrong), None, "{wrong}");
         }
+    }
+
+    #[test]
+    fn lines_of_other_files_are_refused() {
+        for wrong in [
+            r#"{"custom_id":"k","method":"POST","url":"/v1/chat/completions","body":{}}"#,
+            r#"{"custom_id":"k","result":{"type":"succeeded"}}"#,
+        ] {
+            assert_eq!(BatchLine::read(wrong), None, "{wrong}");
+        }
+    }
+
+    #[test]
+    fn byte_order_mark_of_a_line_is_ignored() {
+        let line = "\u{feff}{\"custom_id\":\"k\",\"error\":{\"message\":\"late\"}}";
+        assert_eq!(read_line(line).id, "k");
     }
 
     #[test]

@@ -18,6 +18,10 @@ pub(super) struct PricedRun<'m> {
     prices: Prices,
     /// Prices found so far, by model; `None` for a model without a known price.
     by_model: HashMap<String, Option<Price>>,
+    /// True if a model has a price in the models file.
+    uses_models_file: bool,
+    /// True if a model has its price from the price table.
+    uses_table: bool,
 }
 
 impl<'m> PricedRun<'m> {
@@ -30,6 +34,8 @@ impl<'m> PricedRun<'m> {
             manifest,
             prices: Prices::from_settings(&manifest.settings)?,
             by_model: HashMap::new(),
+            uses_models_file: false,
+            uses_table: false,
         })
     }
 
@@ -43,10 +49,23 @@ impl<'m> PricedRun<'m> {
             *known
         } else {
             let price = price(&self.prices, self.manifest, model);
+            let is_stated = stated_price(self.manifest, model).is_some();
+            self.uses_models_file |= is_stated;
+            self.uses_table |= price.is_some() && !is_stated;
             self.by_model.insert(model.to_owned(), price);
             price
         };
         price.map(|price| TrialCost::new(price, self.prices.batch, trial))
+    }
+
+    /// Source of the prices used so far, as a phrase that follows "at".
+    fn source(&self) -> String {
+        const MODELS_FILE: &str = "the prices of the models file";
+        match (self.uses_models_file, self.uses_table) {
+            (true, false) => MODELS_FILE.to_owned(),
+            (true, true) => format!("{MODELS_FILE} and {}", self.prices.source()),
+            (false, _) => self.prices.source(),
+        }
     }
 }
 
@@ -77,6 +96,18 @@ impl TrialCost {
 
 /// The price of a model of a run: from the run's models file, else from the price table by the name that the endpoint knows.
 pub(crate) fn price(prices: &Prices, manifest: &RunManifest, model: &str) -> Option<Price> {
+    stated_price(manifest, model).or_else(|| {
+        let columns = manifest
+            .columns
+            .get("model")
+            .and_then(|models| models.get(model));
+        let id = columns.and_then(|content| content.get("--model")?.as_str());
+        prices.find(id.unwrap_or(model))
+    })
+}
+
+/// The price of a model in the run's models file.
+fn stated_price(manifest: &RunManifest, model: &str) -> Option<Price> {
     let stated = manifest
         .settings
         .get("models")
@@ -84,13 +115,7 @@ pub(crate) fn price(prices: &Prices, manifest: &RunManifest, model: &str) -> Opt
         .into_iter()
         .flatten()
         .find(|entry| entry["name"] == *model);
-    let stated = stated.and_then(|entry| serde_json::from_value(entry.get("price")?.clone()).ok());
-    let columns = manifest
-        .columns
-        .get("model")
-        .and_then(|models| models.get(model));
-    let id = columns.and_then(|content| content.get("--model")?.as_str());
-    stated.or_else(|| prices.find(id.unwrap_or(model)))
+    stated.and_then(|entry| serde_json::from_value(entry.get("price")?.clone()).ok())
 }
 
 /// The cost of a run's trials at the prices in its manifest, as text. Attempts without a usable reply are included. `None` if no model of
@@ -129,8 +154,11 @@ pub(super) fn cost_text<'t, D: Detail + 't>(
     };
     let note = match unknown {
         0 => String::new(),
-        n => format!("; {n} replies without a known price or usage"),
+        n => format!(
+            "; {} without a known price or usage",
+            words::plural(n, "reply", "replies")
+        ),
     };
-    let (source, all) = (run.prices.source(), money(dollars + lost_dollars));
+    let (source, all) = (run.source(), money(dollars + lost_dollars));
     Ok((counted > 0 || attempts > 0).then(|| format!("{all} at {source}{lost}{note}")))
 }

@@ -397,7 +397,7 @@ impl Server {
 
     fn with_file(&mut self, id: &str, act: impl FnOnce(&mut StoredFile) -> Answer) -> Answer {
         let mut files = self.files.iter_mut();
-        match files.find(|file| id_in_path(&file.id) == id && !file.deleted) {
+        match files.find(|file| file.id == id && !file.deleted) {
             Some(file) => act(file),
             None => Answer::error(404, "not_found", "no such file"),
         }
@@ -469,11 +469,7 @@ impl Server {
     }
 
     fn look(&mut self, id: &str) -> Answer {
-        let Some(place) = self
-            .batches
-            .iter()
-            .position(|one| id_in_path(&one.id) == id)
-        else {
+        let Some(place) = self.batches.iter().position(|one| one.id == id) else {
             return Answer::error(404, "not_found", "no such batch");
         };
         self.batches[place].looks += 1;
@@ -495,11 +491,7 @@ impl Server {
     }
 
     fn cancel(&mut self, id: &str) -> Answer {
-        let Some(batch) = self
-            .batches
-            .iter_mut()
-            .find(|one| id_in_path(&one.id) == id)
-        else {
+        let Some(batch) = self.batches.iter_mut().find(|one| one.id == id) else {
             return Answer::error(404, "not_found", "no such batch");
         };
         if !batch.cancelled {
@@ -634,11 +626,6 @@ fn page(items: &[Value], query: &str) -> Answer {
         200,
         &json!({"object": "list", "data": items[start..end], "has_more": end < items.len()}),
     )
-}
-
-/// An id as it stands in a path or a query string.
-fn id_in_path(id: &str) -> String {
-    id.replace('-', "%2D").replace('_', "%5F")
 }
 
 /// The purpose, the name and the content of an uploaded file.

@@ -9,6 +9,7 @@ mod upload;
 use std::path::Path;
 use std::time::{Duration, SystemTime};
 
+use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
 use reqwest::header::{CONTENT_TYPE, HeaderMap};
 use reqwest::{Method, RequestBuilder};
 use serde_json::{Value, json};
@@ -275,7 +276,23 @@ fn with_possible_effect(error: AskError) -> AskError {
     }
 }
 
+/// Characters of an id that a segment of a path cannot carry. Ids such as `batch_1` and `file-1` stay as they are (RFC 3986, section 2.3):
+/// some servers compare paths without decoding them.
+const ENCODED: &AsciiSet = &NON_ALPHANUMERIC.remove(b'-').remove(b'_').remove(b'~');
+
 /// An id, percent-encoded as a segment of a path.
 fn path_segment(id: &str) -> String {
-    percent_encoding::utf8_percent_encode(id, percent_encoding::NON_ALPHANUMERIC).to_string()
+    utf8_percent_encode(id, ENCODED).to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn common_ids_are_not_encoded() {
+        for (id, segment) in [("batch_6f-0a", "batch_6f-0a"), ("../a?b", "%2E%2E%2Fa%3Fb")] {
+            assert_eq!(path_segment(id), segment);
+        }
+    }
 }

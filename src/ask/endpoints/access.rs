@@ -13,7 +13,6 @@ use rustls::pki_types::pem::PemObject as _;
 
 use super::custom_certificates::client_config;
 use super::custom_headers::CustomHeaders;
-use super::proxy::check_proxy;
 use super::url::BaseUrl;
 use crate::ask::secrets::{KeyHeader, Scrub, Secret};
 use crate::ask::vendors::Vendor;
@@ -131,7 +130,6 @@ impl Access {
                 .map_err(|e| Error::usage("--ca-file", e.to_string()))?;
             client = client.tls_backend_preconfigured(config);
         }
-        check_proxy(&self.base, |name| std::env::var_os(name))?;
         if self.base.is_loopback() {
             client = client.no_proxy();
         }

@@ -12,6 +12,7 @@ use tokio::time::Instant;
 
 use super::access::{Access, connect_timeout, with_causes};
 use super::connection_fault::{UNKNOWN_HOST, is_unknown_host, lacks_open_files, permanent_cause};
+use super::proxy::proxy_variable;
 use super::time_limit::TimeLimit;
 use super::url::BaseUrl;
 use crate::ask::failures::{AskError, Reach, Retry};
@@ -117,6 +118,8 @@ pub(in crate::ask) struct Connection {
     pub(in crate::ask) scrub: Scrub,
     client: Client,
     timeout: Duration,
+    /// Variable that sets the proxy; `None` without a proxy.
+    proxy: Option<&'static str>,
     /// True after the first response: from then on an unknown host name is a DNS outage, not a mistyped address.
     has_answered: Arc<AtomicBool>,
 }
@@ -144,6 +147,7 @@ impl Connection {
     /// Prepares connections to an endpoint; nothing is sent yet.
     pub(super) fn new(access: &Access, scrub: Scrub, timeout: Duration) -> Result<Self> {
         Ok(Self {
+            proxy: proxy_variable(&access.base, |name| std::env::var_os(name))?,
             client: access.client(timeout, &scrub)?,
             base: access.base.clone(),
             scrub,
@@ -370,6 +374,10 @@ impl Connection {
                 ..AskError::new(FailureKind::Connection, message)
             };
         }
+        let server = match self.proxy {
+            Some(variable) => format!("{}, through the proxy of {variable}", self.base),
+            None => self.base.to_string(),
+        };
         let is_mistyped = !self.has_answered.load(Ordering::Relaxed) && is_unknown_host(&text);
         let remedy = is_mistyped
             .then_some(UNKNOWN_HOST)
@@ -378,10 +386,10 @@ impl Connection {
             return AskError {
                 retry: Retry::AfterDelay,
                 may_have_effect,
-                ..AskError::new(FailureKind::Connection, format!("{}: {text}", self.base))
+                ..AskError::new(FailureKind::Connection, format!("{server}: {text}"))
             };
         };
-        let message = format!("{}: {remedy} ({text})", self.base);
+        let message = format!("{server}: {remedy} ({text})");
         AskError {
             reach: Reach::Endpoint,
             ..AskError::new(FailureKind::Connection, message)

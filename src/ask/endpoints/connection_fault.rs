@@ -5,7 +5,7 @@ use std::error::Error;
 use std::io;
 
 /// Phrases in errors that a retry does not solve, with the remedy.
-const PERMANENT_CAUSES: [(&[&str], &str); 7] = [
+const PERMANENT_CAUSES: [(&[&str], &str); 8] = [
     (
         &["UnknownIssuer", "self-signed", "self signed"],
         "its certificate is signed by an authority that is not trusted; name that authority, or the certificate itself, with --ca-file",
@@ -38,6 +38,10 @@ const PERMANENT_CAUSES: [(&[&str], &str); 7] = [
             "proxy authentication required",
         ],
         "the proxy asks for a user and password: set them in HTTPS_PROXY, or name the host in NO_PROXY",
+    ),
+    (
+        &["failed to create underlying connection: received corrupt message"],
+        "the proxy speaks plain http at this port; give it as http:// in that variable",
     ),
     (
         &["InvalidContentType", "corrupt message"],
@@ -123,7 +127,12 @@ mod tests {
             (
                 "received corrupt message of type InvalidContentType",
                 false,
-                "http://",
+                "http:// in --base-url",
+            ),
+            (
+                "tunnel error: failed to create underlying connection: received corrupt message of type InvalidContentType",
+                false,
+                "the proxy speaks plain http",
             ),
             (
                 "client error: invalid HTTP version parsed",

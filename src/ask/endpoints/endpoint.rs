@@ -269,9 +269,12 @@ impl Endpoint {
             if failed.failure.kind == FailureKind::Connection
                 && !self.connection_reported.swap(true, Ordering::Relaxed)
             {
-                warn!(
-                    "{problem}; trying again. Is a server running there? --base-url names the address"
-                );
+                let hint = if failed.is_unconnected() {
+                    ". Is a server running there? --base-url names the address"
+                } else {
+                    ""
+                };
+                warn!("{problem}; trying again{hint}");
             }
             if failed.retry == Retry::WhenAccepted {
                 self.warn_about_refusal(request.model, problem);

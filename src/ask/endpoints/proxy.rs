@@ -1,4 +1,4 @@
-//! Check of the proxy settings in the environment: [`check_proxy`].
+//! The proxy that the environment sets: [`proxy_variable`].
 
 use std::ffi::OsString;
 
@@ -12,23 +12,24 @@ use crate::error::{Error, Result};
 /// Valid proxy address, to find out whether `NO_PROXY` exempts an address.
 const SAMPLE_PROXY: &str = "http://127.0.0.1:1";
 
-/// Checks that the proxy for an address is usable: reqwest ignores an invalid proxy and would connect directly.
+/// Variable that sets the proxy for an address; `None` if requests are sent directly. The proxy must be usable: reqwest ignores an invalid
+/// one and would connect directly.
 ///
 /// Reads the same variables in the same order as reqwest: `HTTP_PROXY` or `HTTPS_PROXY` by the scheme of the address, then
 /// `ALL_PROXY`, each before its lower-case name. An empty variable counts as unset.
 ///
 /// # Errors
 /// If the proxy is not usable. The error names the variable but not its value, which may contain a password.
-pub(super) fn check_proxy(
+pub(super) fn proxy_variable(
     base: &BaseUrl,
     variable: impl Fn(&str) -> Option<OsString>,
-) -> Result<()> {
+) -> Result<Option<&'static str>> {
     // Requests to this machine use no proxy.
     if base.is_loopback() {
-        return Ok(());
+        return Ok(None);
     }
     let Ok(address) = base.to_string().parse::<Uri>() else {
-        return Ok(());
+        return Ok(None);
     };
     let by_scheme = if base.is_plain() {
         ["HTTP_PROXY", "http_proxy"]
@@ -38,15 +39,18 @@ pub(super) fn check_proxy(
     let Some((name, value)) = first_set(&variable, by_scheme)
         .or_else(|| first_set(&variable, ["ALL_PROXY", "all_proxy"]))
     else {
-        return Ok(());
+        return Ok(None);
     };
     let no_proxy = first_set(&variable, ["NO_PROXY", "no_proxy"])
         .and_then(|(_, value)| value.into_string().ok())
         .unwrap_or_default();
     let matcher = Matcher::builder().all(SAMPLE_PROXY).no(no_proxy).build();
     let is_exempt = matcher.intercept(&address).is_none();
-    if is_exempt || value.to_str().is_some_and(is_usable) {
-        return Ok(());
+    if is_exempt {
+        return Ok(None);
+    }
+    if value.to_str().is_some_and(is_usable) {
+        return Ok(Some(name));
     }
     let problem = "not a proxy that can be used, and nothing was sent without it; expected for example http://proxy.example:3128 (no \
                    SOCKS). To connect directly, unset it or name the host in NO_PROXY";
@@ -91,7 +95,7 @@ mod tests {
 
     /// Variable with an unusable proxy for this address and environment.
     fn refused(base: &str, set: &[(&str, &str)]) -> Option<String> {
-        let error = check_proxy(&base.parse().unwrap(), |name| {
+        let error = proxy_variable(&base.parse().unwrap(), |name| {
             set.iter()
                 .find(|(known, _)| *known == name)
                 .map(|(_, value)| value.into())

@@ -10,10 +10,31 @@ const MIN_LENGTH: usize = 20;
 /// not have, or is a long mixture of letters and digits without an underscore.
 pub(crate) fn looks_like_key(name: &str) -> bool {
     let is_variable_name = name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
-    let is_long_mixture = name.len() >= MIN_LENGTH
-        && !name.contains('_')
-        && name.contains(|c: char| c.is_ascii_digit());
-    is_secret_value(name) || !is_variable_name || is_long_mixture
+    is_secret_value(name) || !is_variable_name || is_long_mixture(name)
+}
+
+/// True if the path of a missing file looks like a key: it has the prefix of a key, or is a long mixture of letters and digits without
+/// separators.
+pub(super) fn is_key_in_place_of_file(path: &str) -> bool {
+    is_secret_value(path) || !path.contains(['/', '\\', '.', ' ']) && is_long_mixture(path)
+}
+
+fn is_long_mixture(text: &str) -> bool {
+    text.len() >= MIN_LENGTH && !text.contains('_') && text.contains(|c: char| c.is_ascii_digit())
+}
+
+/// True if a key is written as in a shell or a `.env` file: in quotation marks, or after the name of a variable.
+pub(super) fn is_shell_text(key: &str) -> bool {
+    let is_quoted = ['"', '\'']
+        .iter()
+        .any(|quote| key.len() > 1 && key.starts_with(*quote) && key.ends_with(*quote));
+    let is_assigned = key.split_once('=').is_some_and(|(name, value)| {
+        let is_name = name
+            .bytes()
+            .all(|byte| byte.is_ascii_uppercase() || byte == b'_');
+        is_name && name.contains('_') && !value.trim_matches('=').is_empty()
+    });
+    is_quoted || is_assigned
 }
 
 /// True if a value has the prefix of a key.

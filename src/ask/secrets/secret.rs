@@ -3,6 +3,7 @@
 use std::fmt;
 use std::path::Path;
 
+use super::key_form::{is_key_in_place_of_file, is_shell_text};
 use super::secret_parts::{MASK, SecretParts};
 use crate::error::{Error, Result};
 use crate::files::reading;
@@ -34,16 +35,31 @@ impl Secret {
                 "the key has spaces or characters that an HTTP header cannot carry; it must be one line of visible ASCII",
             ));
         }
+        if is_shell_text(key) {
+            return Err(Error::usage(
+                origin,
+                "the key is in quotation marks, or has NAME= before it; leave only the key itself",
+            ));
+        }
         Ok(Self(key.to_owned()))
     }
 
     /// Reads a key from a file.
     ///
     /// # Errors
-    /// If the file cannot be read, or is not a single line of visible ASCII, such as a file named by mistake. The error does not show its
-    /// content.
+    /// If the file cannot be read, or is not a single line of visible ASCII, such as a file named by mistake. The error shows neither its
+    /// content nor a key in place of the path.
     pub(in crate::ask) fn read(path: &Path) -> Result<Self> {
-        let bytes = reading::at_most(path, MAX_FILE)?;
+        let bytes = reading::at_most(path, MAX_FILE).map_err(|error| {
+            if path.to_str().is_some_and(is_key_in_place_of_file) {
+                Error::usage(
+                    "--api-key-file",
+                    "the name of a file expected; this value looks like a key and is not shown here: write it to a file, and name that file",
+                )
+            } else {
+                error
+            }
+        })?;
         let origin = format!("--api-key-file {}", path.display());
         let text = String::from_utf8_lossy(&bytes);
         if text.contains("-----BEGIN") {
@@ -51,7 +67,7 @@ impl Secret {
                 "this is a private key or a certificate, not an API key; nothing of it was sent";
             return Err(Error::usage(origin, problem));
         }
-        Self::new(&text, &origin)
+        Self::new(text.trim_start_matches('\u{feff}'), &origin)
     }
 
     /// The key as plain text, for HTTP headers.
@@ -196,6 +212,31 @@ mod tests {
         }
     }
 
+    #[test]
+    fn keys_in_shell_syntax_are_refused() {
+        for wrong in ["\"sk-abc\"", "'sk-abc'", "OPENAI_API_KEY=sk-abc"] {
+            let error = Secret::new(wrong, "KEY").unwrap_err().to_string();
+            assert!(error.contains("leave only the key itself"), "{error}");
+            assert!(!error.contains("sk-"), "{error}");
+        }
+        for right in ["c2VjcmV0LWtleQ==", "AB_C==", "a=b", "\"", "it's"] {
+            assert_eq!(Secret::new(right, "KEY").unwrap().expose(), right);
+        }
+    }
+
+    #[test]
+    fn a_key_in_place_of_its_file_is_not_shown() {
+        for key in ["sk-proj-0123", "0123456789abcdef0123456789abcdef"] {
+            let error = Secret::read(Path::new(key)).unwrap_err().to_string();
+            assert!(error.contains("the name of a file expected"), "{error}");
+            assert!(!error.contains(key), "{error}");
+        }
+        for file in ["nowhere", "nowhere/key-of-the-vision-team-2026.txt"] {
+            let error = Secret::read(Path::new(file)).unwrap_err().to_string();
+            assert!(error.contains(file), "{error}");
+        }
+    }
+
     fn read_text(path: &std::path::Path, text: &[u8]) -> Result<Secret, String> {
         std::fs::write(path, text).unwrap();
         Secret::read(path).map_err(|e| e.to_string())
@@ -204,10 +245,9 @@ mod tests {
     #[test]
     fn files_without_a_key_are_refused() {
         let file = tempfile::NamedTempFile::new().unwrap();
-        assert_eq!(
-            read_text(file.path(), b"sk-abc\n").unwrap().expose(),
-            "sk-abc"
-        );
+        for right in [&b"sk-abc\n"[..], b"\xef\xbb\xbfsk-abc\r\n"] {
+            assert_eq!(read_text(file.path(), right).unwrap().expose(), "sk-abc");
+        }
         for wrong in [
             &b"sk-abc\nsk-def\n"[..],
             b"-----BEGIN OPENSSH PRIVATE KEY-----\nabc\n",

@@ -14,11 +14,13 @@ pub(super) fn is_stream(text: &str, content_type: &str) -> bool {
 
 /// Events of a stream up to `[DONE]`, as JSON. A truncated event, which is not JSON, becomes null.
 ///
-/// Lines may end in CR, LF or both. Event names, and comments, which keep a connection open, are skipped.
+/// Lines may end in CR, LF or both. Event names are skipped, and so are comments and empty events, which keep a
+/// connection open.
 pub(super) fn events(stream: &str) -> impl Iterator<Item = Value> {
     stream
         .split(['\n', '\r'])
         .filter_map(|line| line.strip_prefix("data:").map(str::trim))
+        .filter(|data| !data.is_empty())
         .take_while(|data| *data != "[DONE]")
         .map(|data| parse(data).unwrap_or_default())
 }
@@ -176,6 +178,13 @@ mod tests {
             "choices": [{"index": 0, "message": {"content": "B.", "reasoning_content": "A"}, "finish_reason": "stop"}],
         });
         assert_eq!(assemble(stream), Ok(expected));
+    }
+
+    #[test]
+    fn empty_events_are_skipped() {
+        let piece = "data: {\"choices\":[{\"index\":0,\"delta\":{\"content\":\"B\"},\"finish_reason\":\"stop\"}]}\n\n";
+        let joined = assemble(&format!("data:\n\n{piece}data: \n\ndata: [DONE]\n\n")).unwrap();
+        assert_eq!(joined["choices"][0]["message"]["content"], "B");
     }
 
     #[test]

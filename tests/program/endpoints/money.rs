@@ -500,7 +500,10 @@ fn bill_is_that_of_vendors() {
     let by_hand: f64 = vendors.iter().map(|(_, dollars)| dollars).sum();
     assert!((by_hand - 77.15).abs() < 1e-9);
     let page = std::fs::read_to_string(bench.path("run/report.html")).unwrap();
-    assert!(page.contains("$77.15 at the list prices"), "{by_hand}");
+    assert!(
+        page.contains("$77.15 at the prices of the models file"),
+        "{by_hand}"
+    );
     let mut all = records(&bench.path("run"));
     all.sort_by_key(|record| record["question"].to_string());
     let totals: Vec<&Value> = all
@@ -525,7 +528,10 @@ fn report_counts_cost_of_failures() {
     priced(&bench, &mock);
     bench.complete(&words(PRICED));
     let page = std::fs::read_to_string(bench.path("run/report.html")).unwrap();
-    let cost = page.split("at the list prices").next().unwrap();
+    let cost = page
+        .split("at the prices of the models file")
+        .next()
+        .unwrap();
     assert!(cost.ends_with("$2.60 "), "{}", &cost[cost.len() - 60..]);
     assert!(page.contains(", $2.00 of it for 1 attempt without a usable reply"));
 }

@@ -55,7 +55,7 @@ fn folder_controls_detached_run() {
     m · 4 questions · 1 frame · 1 reply, 3 failed · intervals by question
     ! run: incomplete: 1 of 4 trials answered, 3 failed. The same command asks the
       rest.
-    ! 3 trials of m failed and are not scored.
+    ! 3 trials of m failed and are not scored: no whole reply in time.
     ! Only 4 questions (8 are needed): intervals and tests are rough.
 
      accuracy in %

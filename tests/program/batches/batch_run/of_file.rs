@@ -68,8 +68,8 @@ fn batches_use_key_of_model() {
         let key = request.header("authorization").unwrap().to_owned();
         assert!(["Bearer key-a", "Bearer key-b"].contains(&&*key));
         let of = |id: &str| request.line.contains(id);
-        if of("batch%5F1") || of("batch%5F2") {
-            assert_eq!(of("batch%5F1"), key == "Bearer key-a", "{}", request.line);
+        if of("batch_1") || of("batch_2") {
+            assert_eq!(of("batch_1"), key == "Bearer key-a", "{}", request.line);
         }
     }
 }
@@ -166,7 +166,7 @@ fn vendor_refusing_batches_stops_its_models() {
     2 models · 4 questions · 1 frame · 4 replies, 4 failed · intervals by question
     ! run: stopped: 4 of 8 trials answered, 4 failed. The same command asks the
       rest.
-    ! 4 trials of m failed and are not scored.
+    ! 4 trials of m failed and are not scored: no whole reply in time.
     ! Only 4 questions (8 are needed): intervals and tests are rough.
 
      accuracy in %
