@@ -423,6 +423,39 @@ mod tests {
         assert_eq!(frame.semantic.unwrap(), array![[3, 4]]);
         assert_eq!(frame.segments.unwrap(), array![[0, 1500]]);
     }
+    #[test]
+    fn frame_spelled_otherwise_is_named() {
+        let folder = folder("");
+        let question =
+            r#"{"id":1,"frame":"A%2F0","question":"?","choices":["x","y"],"answer":"x"}"#;
+        fs::write(folder.path().join(QUESTIONS), question).unwrap();
+        let problem = open(folder.path(), None, &SetArgs::default()).unwrap_err();
+        assert!(
+            problem
+                .to_string()
+                .contains("does not have (its frame \"a/0\" differs only in spelling)"),
+            "{problem}"
+        );
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn names_alike_without_utf8_are_refused() {
+        use std::os::unix::ffi::OsStrExt as _;
+
+        let folder = tempfile::tempdir().unwrap();
+        for name in [&b"caf\xE9.png"[..], b"caf\xE8.png"] {
+            fs::write(folder.path().join(std::ffi::OsStr::from_bytes(name)), "").unwrap();
+        }
+        let listed = sources(folder.path(), &[], MissingFiles::Refuse).map(|_| ());
+        let place = DataPlace::Path(folder.path().to_owned());
+        let searched = Photographs::open(&place, &SetArgs::default()).map(|_| ());
+        for problem in [listed, searched] {
+            let problem = problem.unwrap_err().to_string();
+            assert!(problem.contains("not UTF-8; rename it"), "{problem}");
+        }
+    }
+
 
     fn refusal(folder: &Path) -> String {
         sources(folder, &[], MissingFiles::Refuse)

@@ -212,7 +212,7 @@ fn backslash_in_path_is_named() {
     std::fs::write(folder.path().join("images/a.png"), "").unwrap();
     let problem = refusal(&path, &SetArgs::default());
     assert!(
-        problem.contains("the file \"images/a.png\" exists: write / in place of \\;"),
+        problem.contains("; it is named \"images/a.png\": write this in the data;"),
         "{problem}"
     );
 }
