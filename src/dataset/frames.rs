@@ -346,7 +346,7 @@ fn images(root: &Root) -> Result<BTreeMap<FrameId, ImageSource>> {
     let found = ImagePaths::from_paths(all.clone());
     for path in &found.images {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
-        sources.insert(FrameId(name.into_owned()), ImageSource::image(path.clone()));
+        insert_image(&mut sources, name.into_owned(), path)?;
     }
     if sources.is_empty() {
         let questions = folder.join(QUESTIONS);
@@ -374,6 +374,23 @@ fn images(root: &Root) -> Result<BTreeMap<FrameId, ImageSource>> {
     Ok(sources)
 }
 
+/// Adds an image as a frame of this name.
+///
+/// # Errors
+/// If another image has the name: the bytes of a file name that are not UTF-8 all become the replacement character.
+pub(super) fn insert_image(
+    sources: &mut BTreeMap<FrameId, ImageSource>,
+    name: String,
+    path: &Path,
+) -> Result<()> {
+    let image = ImageSource::image(path.to_owned());
+    if sources.insert(FrameId(name), image).is_some() {
+        let problem = "another file has the same name but for bytes that are not UTF-8; rename it";
+        return Err(Error::data(path.display(), problem));
+    }
+    Ok(())
+}
+
 /// True if the path is a folder with an image directly in it.
 fn has_images(folder: &Path) -> bool {
     entries(folder).is_ok_and(|inner| inner.iter().any(|path| is_image(path)))
@@ -384,6 +401,7 @@ mod tests {
     use image::{GrayImage, ImageBuffer, Luma, RgbImage};
     use ndarray::array;
 
+    use super::super::{DataPlace, Photographs};
     use super::*;
 
     /// A folder of one image, its maps and a `frames.jsonl` of one line with these extra keys.
@@ -402,27 +420,6 @@ mod tests {
         folder
     }
 
-    #[test]
-    fn frame_has_the_maps_of_its_line() {
-        let id = FrameId("a/0".into());
-        let bare = folder(r#","depth":null,"depth_scale":0.001"#);
-        let frame = open(bare.path(), None, &SetArgs::default())
-            .unwrap()
-            .frame(&id)
-            .unwrap();
-        assert_eq!((&frame.id, frame.rgb.width()), (&id, 2));
-        assert!(frame.depth.is_none() && frame.semantic.is_none() && frame.segments.is_none());
-        let full = folder(
-            r#","depth":"deep.png","depth_scale":0.002,"sem":"sem.png","over":"deep.png","t":1.5"#,
-        );
-        let frame = open(full.path(), None, &SetArgs::default())
-            .unwrap()
-            .frame(&id)
-            .unwrap();
-        assert_eq!(frame.depth.unwrap(), array![[0, 3000]]);
-        assert_eq!(frame.semantic.unwrap(), array![[3, 4]]);
-        assert_eq!(frame.segments.unwrap(), array![[0, 1500]]);
-    }
     #[test]
     fn frame_spelled_otherwise_is_named() {
         let folder = folder("");
@@ -456,6 +453,27 @@ mod tests {
         }
     }
 
+    #[test]
+    fn frame_has_the_maps_of_its_line() {
+        let id = FrameId("a/0".into());
+        let bare = folder(r#","depth":null,"depth_scale":0.001"#);
+        let frame = open(bare.path(), None, &SetArgs::default())
+            .unwrap()
+            .frame(&id)
+            .unwrap();
+        assert_eq!((&frame.id, frame.rgb.width()), (&id, 2));
+        assert!(frame.depth.is_none() && frame.semantic.is_none() && frame.segments.is_none());
+        let full = folder(
+            r#","depth":"deep.png","depth_scale":0.002,"sem":"sem.png","over":"deep.png","t":1.5"#,
+        );
+        let frame = open(full.path(), None, &SetArgs::default())
+            .unwrap()
+            .frame(&id)
+            .unwrap();
+        assert_eq!(frame.depth.unwrap(), array![[0, 3000]]);
+        assert_eq!(frame.semantic.unwrap(), array![[3, 4]]);
+        assert_eq!(frame.segments.unwrap(), array![[0, 1500]]);
+    }
 
     fn refusal(folder: &Path) -> String {
         sources(folder, &[], MissingFiles::Refuse)
