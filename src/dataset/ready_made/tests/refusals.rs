@@ -181,3 +181,17 @@ fn bad_rows_are_left_out_up_to_a_share() {
     };
     assert_eq!(open(&path, &raised).unwrap().questions().len(), 9);
 }
+
+#[test]
+fn separator_of_options_is_proposed() {
+    for (options, split) in [
+        ("red|blue, dark", "options:split(|)"),
+        ("red; blue", "options:split(;)"),
+        ("A. red\nB. blue", r"options:split(\n)"),
+    ] {
+        let (_folder, path) = with(&[json!({"options": options, "answer": "red"})]);
+        let problem = refusal(&path, &SetArgs::default());
+        assert!(problem.contains(split), "{problem}");
+        assert_eq!(answer_read_as(&path, &format!("options={split}")), "red");
+    }
+}
