@@ -303,7 +303,7 @@ impl ColumnFormat {
     /// Index of the option that an answer identifies.
     fn choice_index(&self, answer: &str, options: &OptionList) -> Option<usize> {
         if self.is_chosen {
-            self.format.choice_index(answer, options)
+            self.format.chosen_choice_index(answer, options)
         } else {
             self.format.inferred_choice_index(answer, options)
         }

@@ -183,6 +183,13 @@ fn bad_rows_are_left_out_up_to_a_share() {
 }
 
 #[test]
+fn lower_case_letters_are_read_as_told() {
+    let (_folder, path) = with(&[json!({"options": ["x", "y"], "answer": "b"})]);
+    assert!(refusal(&path, &SetArgs::default()).contains("neither by letter nor by text"));
+    assert_eq!(answer_read_as(&path, "answer=answer:letter"), "y");
+}
+
+#[test]
 fn separator_of_options_is_proposed() {
     for (options, split) in [
         ("red|blue, dark", "options:split(|)"),
