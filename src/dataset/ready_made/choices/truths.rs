@@ -49,15 +49,11 @@ pub(in crate::dataset::ready_made) fn find_truths(
     omissions: &mut Omissions,
 ) -> Result<Truths, String> {
     if roles.answers.is_empty() && items.iter().all(|item| item.options.is_none()) {
-        for item in items {
-            omissions.add(OmissionReason::Open, || {
-                format!(
-                    "not in a column that is known ({})",
-                    table.place_in_set(item.row)
-                )
-            });
-        }
-        return Ok(Truths::default());
+        return Err(format!(
+            "neither options nor answers among its columns: --map options=COLUMN,answer=COLUMN names them, and --map answer=COLUMN \
+             those of yes/no questions; --ask FILE asks questions without answers about every image. Its columns:\n{}",
+            describe_columns(table)
+        ));
     }
     if roles.answers.is_empty() {
         let remedy = answer_column::suggest_column(table, roles, &items).map_or_else(

@@ -183,6 +183,19 @@ fn bad_rows_are_left_out_up_to_a_share() {
 }
 
 #[test]
+fn questions_alone_name_their_columns() {
+    let (_folder, path) = with(&[json!({"question_type": "is there", "verdict": "yes"})]);
+    let problem = refusal(&path, &SetArgs::default());
+    assert!(
+        problem.contains("neither options nor answers among its columns")
+            && problem.contains("--map answer=COLUMN those of yes/no questions")
+            && problem.contains("verdict"),
+        "{problem}"
+    );
+    assert_eq!(answer_read_as(&path, "answer=verdict"), "yes");
+}
+
+#[test]
 fn lower_case_letters_are_read_as_told() {
     let (_folder, path) = with(&[json!({"options": ["x", "y"], "answer": "b"})]);
     assert!(refusal(&path, &SetArgs::default()).contains("neither by letter nor by text"));
