@@ -41,7 +41,7 @@ pub(super) use preset::{is_known as is_known_set, names as known_sets};
 pub use settings::SetArgs;
 pub(super) use summary::LEFT_OUT;
 
-use cells::Table;
+use cells::{Cell, Table};
 use choices::{ParsedQuestion, find_truths, is_native_format};
 use columns::map::{CellFormat, ColumnMap};
 use columns::names::Role;
@@ -477,10 +477,16 @@ fn with_image_hint(table: &Table, roles: &Roles, problem: String) -> String {
     if has_images {
         return problem;
     }
-    let key = roles
-        .ids
-        .first()
-        .map(|column| column.name.as_str())
+    let named_image = table.columns.iter().enumerate().find(|(index, name)| {
+        name.to_lowercase().contains("image")
+            && table
+                .rows
+                .iter()
+                .all(|row| matches!(row.cell(*index), Cell::Text(_) | Cell::Number(_)))
+    });
+    let key = named_image
+        .map(|(_, name)| name.as_str())
+        .or(roles.ids.first().map(|column| column.name.as_str()))
         .or(table.columns.first().map(String::as_str))
         .unwrap_or("id");
     format!(

@@ -215,3 +215,16 @@ fn separator_of_options_is_proposed() {
         assert_eq!(answer_read_as(&path, &format!("options={split}")), "red");
     }
 }
+
+#[test]
+fn column_of_image_numbers_is_proposed() {
+    let rows = [row(
+        json!({"id": 1, "imageId": 7, "question": "?", "options": ["x", "y"], "answer": "x"}),
+    )];
+    let (_folder, path) = set("set.json", &rows);
+    let problem = refusal(&path, &SetArgs::default());
+    assert!(
+        problem.contains("--map image='images/{imageId}.jpg'"),
+        "{problem}"
+    );
+}
