@@ -348,7 +348,7 @@ fn answer_outside_options_is_refused() {
     insta::assert_snapshot!(refused.messages(), @r#"
     exit code: 2
     error: data/questions.jsonl: 1 of 2 rows are broken; the first: line 2: the answer "A" is not one of the
-        options ["yes", "no"] (read as text, which fits 1 rows); --skip bad=50% leaves it out
+        options ["yes", "no"] (read as text, which fits 1 row); --skip bad=50% leaves it out
     "#);
 }
 

@@ -12,6 +12,7 @@ use crate::dataset::ready_made::columns::names::Role;
 use crate::dataset::ready_made::columns::{Column, Roles, answer_column, describe_columns};
 use crate::dataset::ready_made::items::{AnswerCell, Item};
 use crate::dataset::ready_made::omissions::{OmissionReason, Omissions};
+use crate::text::words::counted;
 use crate::types::Choices;
 use crate::types::text::excerpt;
 
@@ -314,11 +315,11 @@ impl ColumnFormat {
             Some(truth) => Choices::with_truth(Arc::clone(&options.texts), Some(truth))
                 .map_err(|e| e.to_string()),
             None => Err(format!(
-                "the answer {:?} is not one of the options {} (read as {}, which fits {} rows)",
+                "the answer {:?} is not one of the options {} (read as {}, which fits {})",
                 excerpt(answer, 60),
                 options.excerpt(120),
                 self.format.name(),
-                self.fitting_rows
+                counted(self.fitting_rows, "row")
             )),
         }
     }
