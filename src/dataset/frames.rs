@@ -421,6 +421,23 @@ mod tests {
     }
 
     #[test]
+    fn guessed_answer_format_is_reported() {
+        let folder = folder("");
+        for (answer, format) in [(r#""x""#, None), ("0", Some("answer = answer (index0)"))] {
+            let question = format!(
+                r#"{{"id":1,"frame":"a/0","question":"?","choices":["x","y"],"answer":{answer}}}"#
+            );
+            fs::write(folder.path().join(QUESTIONS), question).unwrap();
+            let dataset = open(folder.path(), None, &SetArgs::default()).unwrap();
+            let summary = dataset.summary.join("\n");
+            match format {
+                None => assert_eq!(summary, ""),
+                Some(format) => assert!(summary.contains(format), "{summary}"),
+            }
+        }
+    }
+
+    #[test]
     fn frame_spelled_otherwise_is_named() {
         let folder = folder("");
         let question =

@@ -256,10 +256,15 @@ pub(super) fn questions_about_frames(file: &Path, args: &SetArgs) -> Result<File
     };
     let notes = table.notes.clone();
     let scenes = Scenes::new(&table, &map, roles.scene.as_ref());
+    // Letters and numbers in place of texts are a guess, which the summary reports.
+    let are_texts = set
+        .answer_columns
+        .iter()
+        .all(|column| column.ends_with("(text)"));
     let contents = assemble(&context, set, frames, scenes, notes, None)?;
     let mut summary = contents.summary;
     let format = if is_native_format(&table) && info.map.is_none() {
-        summary.retain(|line| line.starts_with(LEFT_OUT));
+        summary.retain(|line| !are_texts || line.starts_with(LEFT_OUT));
         SetFormat::Native
     } else {
         SetFormat::Foreign
