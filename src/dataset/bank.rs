@@ -380,7 +380,7 @@ mod tests {
             ),
             (
                 r#"{"id":3,"question":"?","choices":["x"]}"#,
-                "line 4: 1 choices: a question needs 2 to 26",
+                "line 4: 1 choice: a question needs 2 to 26",
             ),
             (
                 r#"{"id":3,"question":"?","choices":["x","X "]}"#,

@@ -346,7 +346,7 @@ fn images(root: &Root) -> Result<BTreeMap<FrameId, ImageSource>> {
     let found = ImagePaths::from_paths(all.clone());
     for path in &found.images {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
-        sources.insert(FrameId(name.into_owned()), ImageSource::image(path.clone()));
+        insert_image(&mut sources, name.into_owned(), path)?;
     }
     if sources.is_empty() {
         let questions = folder.join(QUESTIONS);
@@ -396,6 +396,23 @@ pub(super) fn warn_of_subfolders(folder: &Path, further: &[PathBuf]) -> Result<(
     Ok(())
 }
 
+/// Adds an image as a frame of this name.
+///
+/// # Errors
+/// If another image has the name: the bytes of a file name that are not UTF-8 all become the replacement character.
+pub(super) fn insert_image(
+    sources: &mut BTreeMap<FrameId, ImageSource>,
+    name: String,
+    path: &Path,
+) -> Result<()> {
+    let image = ImageSource::image(path.to_owned());
+    if sources.insert(FrameId(name), image).is_some() {
+        let problem = "another file has the same name but for bytes that are not UTF-8; rename it";
+        return Err(Error::data(path.display(), problem));
+    }
+    Ok(())
+}
+
 fn is_hidden(path: &Path) -> bool {
     path.file_name()
         .is_some_and(|name| name.to_string_lossy().starts_with('.'))
@@ -411,6 +428,7 @@ mod tests {
     use image::{GrayImage, ImageBuffer, Luma, RgbImage};
     use ndarray::array;
 
+    use super::super::{DataPlace, Photographs};
     use super::*;
 
     /// A folder of one image, its maps and a `frames.jsonl` of one line with these extra keys.
@@ -427,6 +445,56 @@ mod tests {
         let question = r#"{"id":1,"frame":"a/0","question":"?","choices":["x","y"],"answer":"x"}"#;
         fs::write(root.join(QUESTIONS), question).unwrap();
         folder
+    }
+
+    #[test]
+    fn guessed_answer_format_is_reported() {
+        let folder = folder("");
+        for (answer, format) in [(r#""x""#, None), ("0", Some("answer = answer (index0)"))] {
+            let question = format!(
+                r#"{{"id":1,"frame":"a/0","question":"?","choices":["x","y"],"answer":{answer}}}"#
+            );
+            fs::write(folder.path().join(QUESTIONS), question).unwrap();
+            let dataset = open(folder.path(), None, &SetArgs::default()).unwrap();
+            let summary = dataset.summary.join("\n");
+            match format {
+                None => assert_eq!(summary, ""),
+                Some(format) => assert!(summary.contains(format), "{summary}"),
+            }
+        }
+    }
+
+    #[test]
+    fn frame_spelled_otherwise_is_named() {
+        let folder = folder("");
+        let question =
+            r#"{"id":1,"frame":"A%2F0","question":"?","choices":["x","y"],"answer":"x"}"#;
+        fs::write(folder.path().join(QUESTIONS), question).unwrap();
+        let problem = open(folder.path(), None, &SetArgs::default()).unwrap_err();
+        assert!(
+            problem
+                .to_string()
+                .contains("does not have (its frame \"a/0\" differs only in spelling)"),
+            "{problem}"
+        );
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn names_alike_without_utf8_are_refused() {
+        use std::os::unix::ffi::OsStrExt as _;
+
+        let folder = tempfile::tempdir().unwrap();
+        for name in [&b"caf\xE9.png"[..], b"caf\xE8.png"] {
+            fs::write(folder.path().join(std::ffi::OsStr::from_bytes(name)), "").unwrap();
+        }
+        let listed = sources(folder.path(), &[], MissingFiles::Refuse).map(|_| ());
+        let place = DataPlace::Path(folder.path().to_owned());
+        let searched = Photographs::open(&place, &SetArgs::default()).map(|_| ());
+        for problem in [listed, searched] {
+            let problem = problem.unwrap_err().to_string();
+            assert!(problem.contains("not UTF-8; rename it"), "{problem}");
+        }
     }
 
     #[test]

@@ -23,6 +23,7 @@ mod ready_made;
 mod root;
 mod scene_args;
 mod settings;
+mod similar_path;
 mod unusable;
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
@@ -53,6 +54,7 @@ pub(crate) use scene_args::SceneArgs;
 pub(crate) use settings::{
     BankArgs, DataArgs, DecodeArgs, FolderArgs, PixelLimit, SelectionArgs, parse_data_place,
 };
+use similar_path::folded;
 
 /// Where the data are, as given by `--data`.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -199,10 +201,16 @@ impl Dataset {
         let unmatched = questions
             .iter()
             .find(|question| !self.sources.contains_key(&question.frame));
-        let example = self.sources.keys().next().map_or("", |id| id.0.as_str());
         let problem = unmatched.map(|unmatched| {
+            let wanted = folded(&unmatched.frame.0);
+            let same = self.sources.keys().find(|id| folded(&id.0) == wanted);
+            let names = match (same, self.sources.keys().next()) {
+                (Some(id), _) => format!("its frame {:?} differs only in spelling", id.0),
+                (None, Some(id)) => format!("its frames are named like {:?}", id.0),
+                (None, None) => "it has no frames".to_owned(),
+            };
             format!(
-                "{}: question {:?} is about the frame {:?}, which {} does not have (its frames are named like {example:?})",
+                "{}: question {:?} is about the frame {:?}, which {} does not have ({names})",
                 file.display(),
                 excerpt(&unmatched.id.0, 60),
                 excerpt(&unmatched.frame.0, 80),

@@ -6,11 +6,10 @@ use std::path::{Path, PathBuf};
 use super::frames::MissingFiles;
 use super::image_paths::{ImagePaths, is_image};
 use super::root::{Location, Root};
-use super::{DataPlace, Dataset, ImageSource, SetArgs, frames, stem};
+use super::{DataPlace, Dataset, SetArgs, frames, stem};
 use crate::error::{Error, Result};
 use crate::files::reading::entries;
 use crate::picture::image_file::format::SUPPORTED_FORMATS;
-use crate::types::FrameId;
 
 /// Images at a place, for questions that are asked about every image.
 #[derive(Debug)]
@@ -81,7 +80,7 @@ impl Photographs {
                 .iter()
                 .map(|part| part.to_string_lossy())
                 .collect();
-            sources.insert(FrameId(parts.join("/")), ImageSource::image(path.clone()));
+            frames::insert_image(&mut sources, parts.join("/"), path)?;
         }
         if sources.is_empty() {
             let unread = found

@@ -7,6 +7,7 @@ use std::path::{self, Component, Path, PathBuf};
 
 use clap::Args;
 
+use super::similar_path::SimilarPaths;
 use crate::error::{Error, Result};
 use crate::types::{Decides, FrameId, shell_word};
 
@@ -37,6 +38,7 @@ pub(crate) struct Root {
     canonical: Vec<PathBuf>,
     /// All folders as absolute paths, with links unresolved.
     unresolved: Vec<PathBuf>,
+    similar: SimilarPaths,
 }
 
 /// Location of a path relative to the allowed folders, following links.
@@ -76,6 +78,7 @@ impl Root {
             folder: folder.to_owned(),
             canonical,
             unresolved,
+            similar: SimilarPaths::default(),
         })
     }
 
@@ -117,10 +120,18 @@ impl Root {
     /// outside the folders exists.
     pub(crate) fn file(&self, base: &Path, spelled: &Path) -> Result<PathBuf, String> {
         let path = self.path(base, spelled)?;
-        if !path.is_file() {
-            return Err(format!("no such file: {}", path.display()));
+        if path.is_file() {
+            return Ok(path);
         }
-        Ok(path)
+        let problem = format!("no such file: {}", path.display());
+        let similar = spelled
+            .to_str()
+            .and_then(|spelled| self.similar.find(base, spelled))
+            .filter(|similar| self.path(base, Path::new(similar)).is_ok());
+        Err(match similar {
+            Some(similar) => format!("{problem}; it is named {similar:?}: write this in the data"),
+            None => problem,
+        })
     }
 
     /// Path of a file that the data name relative to `base`. The file need not exist.

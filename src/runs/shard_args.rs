@@ -5,6 +5,7 @@ use clap::Args;
 use crate::error::{Error, Result};
 use crate::runs::shard::Shard;
 use crate::runs::shard_sources::{WeightedSource, shard_range};
+use crate::text::words::counted;
 use crate::types::Decides;
 
 /// The `--shard` flag.
@@ -47,8 +48,8 @@ pub(crate) fn keep_shard<T>(frames: &mut Vec<T>, shard: Shard) -> Result<()> {
     let own = shard_range(&vec![WeightedSource::equal(); frames.len()], shard);
     if own.is_empty() {
         let problem = format!(
-            "{shard} is empty: there are {} frames; use at most as many parts",
-            frames.len()
+            "{shard} is empty: only {}; use at most as many parts",
+            counted(frames.len(), "frame")
         );
         return Err(Error::usage("--shard", problem));
     }
@@ -74,9 +75,6 @@ mod tests {
         assert!(parts.iter().all(|part| (2..=3).contains(&part.len())));
         assert_eq!(part("1/1").unwrap(), "abcdefg");
         let error = part("8/8").unwrap_err().to_string();
-        assert!(
-            error.contains("8/8 is empty: there are 7 frames"),
-            "{error}"
-        );
+        assert!(error.contains("8/8 is empty: only 7 frames"), "{error}");
     }
 }

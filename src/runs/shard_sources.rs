@@ -6,6 +6,7 @@ use std::ops::Range;
 
 use crate::error::{Error, Result};
 use crate::runs::shard::Shard;
+use crate::text::words::plural;
 use crate::types::manifests::PartPlace;
 
 /// The questions about the sources of a shard, with the place of these sources. The place is `None` if the run is not divided.
@@ -41,8 +42,8 @@ pub(crate) fn shard_questions<Q>(
     let own = shard_range(&sources, shard);
     if own.is_empty() {
         let problem = format!(
-            "{shard} is empty: there are {} frames or walks; use at most as many shards",
-            positions.len()
+            "{shard} is empty: only {}; use at most as many shards",
+            plural(positions.len(), "frame or walk", "frames or walks")
         );
         return Err(Error::usage("--shard", problem));
     }

@@ -41,7 +41,7 @@ pub(super) use preset::{is_known as is_known_set, names as known_sets};
 pub use settings::SetArgs;
 pub(super) use summary::LEFT_OUT;
 
-use cells::Table;
+use cells::{Cell, Table};
 use choices::{ParsedQuestion, find_truths, is_native_format};
 use columns::map::{CellFormat, ColumnMap};
 use columns::names::Role;
@@ -256,10 +256,15 @@ pub(super) fn questions_about_frames(file: &Path, args: &SetArgs) -> Result<File
     };
     let notes = table.notes.clone();
     let scenes = Scenes::new(&table, &map, roles.scene.as_ref());
+    // Letters and numbers in place of texts are a guess, which the summary reports.
+    let are_texts = set
+        .answer_columns
+        .iter()
+        .all(|column| column.ends_with("(text)"));
     let contents = assemble(&context, set, frames, scenes, notes, None)?;
     let mut summary = contents.summary;
     let format = if is_native_format(&table) && info.map.is_none() {
-        summary.retain(|line| line.starts_with(LEFT_OUT));
+        summary.retain(|line| !are_texts || line.starts_with(LEFT_OUT));
         SetFormat::Native
     } else {
         SetFormat::Foreign
@@ -477,10 +482,16 @@ fn with_image_hint(table: &Table, roles: &Roles, problem: String) -> String {
     if has_images {
         return problem;
     }
-    let key = roles
-        .ids
-        .first()
-        .map(|column| column.name.as_str())
+    let named_image = table.columns.iter().enumerate().find(|(index, name)| {
+        name.to_lowercase().contains("image")
+            && table
+                .rows
+                .iter()
+                .all(|row| matches!(row.cell(*index), Cell::Text(_) | Cell::Number(_)))
+    });
+    let key = named_image
+        .map(|(_, name)| name.as_str())
+        .or(roles.ids.first().map(|column| column.name.as_str()))
         .or(table.columns.first().map(String::as_str))
         .unwrap_or("id");
     format!(

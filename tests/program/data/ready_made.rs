@@ -168,6 +168,10 @@ fn check_names_everything_that_is_wrong() {
     problem  a.png: not a whole image: the file ends before its end mark, at byte 257; copy or export it again
     1 problem, 4 warnings
     ");
+    insta::assert_snapshot!(called.lines_with("×"), @"
+    exit code: 1
+    ok       1 image, 0 kB, 1 of 64×48
+    ");
     fs::remove_file(bench.path("a.png")).unwrap();
     let called = bench.call(&words(&format!("{line} --json")));
     let report: Value = serde_json::from_str(&called.stdout).unwrap();
@@ -348,7 +352,7 @@ fn answer_outside_options_is_refused() {
     insta::assert_snapshot!(refused.messages(), @r#"
     exit code: 2
     error: data/questions.jsonl: 1 of 2 rows are broken; the first: line 2: the answer "A" is not one of the
-        options ["yes", "no"] (read as text, which fits 1 rows); --skip bad=50% leaves it out
+        options ["yes", "no"] (read as text, which fits 1 row); --skip bad=50% leaves it out
     "#);
 }
 

@@ -80,7 +80,7 @@ fn images_are_synthesized_in_parts() {
     let empty = bench.call(&words("synthesize frames --out x --shard 8/8"));
     insta::assert_snapshot!(empty.messages(), @"
     exit code: 2
-    error: --shard: 8/8 is empty: there are 7 frames; use at most as many parts
+    error: --shard: 8/8 is empty: only 7 frames; use at most as many parts
     ");
     let both = bench.call(&words("synthesize --check whole --shard 1/2"));
     assert_eq!(both.code, Some(2), "{both:?}");

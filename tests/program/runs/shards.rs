@@ -130,7 +130,7 @@ fn missing_and_foreign_shards_are_named() {
     let empty = bench.call(&args("--out x --shard 7/7"));
     insta::assert_snapshot!(empty.messages(), @"
     exit code: 2
-    error: --shard: 7/7 is empty: there are 6 frames or walks; use at most as many shards
+    error: --shard: 7/7 is empty: only 6 frames or walks; use at most as many shards
     ");
 }
 

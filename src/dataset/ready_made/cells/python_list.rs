@@ -1,27 +1,36 @@
 //! Parser for lists and dictionaries in Python's notation: [`python_list`], [`python_dict`].
 
-/// Parses a list such as `['it\'s', "b", 3]` to texts; `None` if the text is anything else. Nothing is evaluated.
+/// Parses a list such as `['it\'s', "b", 3]`, a tuple of strings, or an array of strings as NumPy prints it (`['a' 'b']`) to texts;
+/// `None` if the text is anything else. Nothing is evaluated.
 ///
 /// Items are strings in single or double quotes with the escapes of Python's `repr` (The Python Language Reference, 2.4.1), numbers, and
 /// the words `True`, `False` and `None`.
 pub(super) fn python_list(text: &str) -> Option<Vec<String>> {
-    let mut rest = text.trim().strip_prefix('[')?.trim_start();
+    let text = text.trim();
+    let is_tuple = text.starts_with('(');
+    let close = if is_tuple { ')' } else { ']' };
+    let mut rest = text.strip_prefix(['[', '('])?.trim_start();
     let mut items = Vec::new();
+    // NumPy has no commas between items; the first separator decides.
+    let mut has_commas = None;
     loop {
-        if let Some(end) = rest.strip_prefix(']') {
-            return end.trim().is_empty().then_some(items);
+        if let Some(end) = rest.strip_prefix(close) {
+            let is_list = !is_tuple || has_commas == Some(true);
+            return (is_list && end.trim().is_empty()).then_some(items);
         }
         let (item, after) = match rest.chars().next()? {
             quote @ ('\'' | '"') => parse_quoted(&rest[1..], quote)?,
+            _ if is_tuple => return None,
             _ => parse_bare(rest)?,
         };
         items.push(item);
-        rest = after.trim_start();
-        match rest.strip_prefix(',') {
-            Some(more) => rest = more.trim_start(),
-            None if rest.starts_with(']') => {}
-            None => return None,
+        let after_space = after.trim_start();
+        let after_comma = after_space.strip_prefix(',');
+        let is_end = after_space.starts_with(close);
+        if !is_end && *has_commas.get_or_insert(after_comma.is_some()) != after_comma.is_some() {
+            return None;
         }
+        rest = after_comma.unwrap_or(after_space).trim_start();
     }
 }
 
@@ -113,6 +122,9 @@ mod tests {
             (r"['\xe9', '\u00e9', 'a\nb']", vec!["é", "é", "a\nb"]),
             ("[1, 2.5, None, ]", vec!["1", "2.5", "None"]),
             ("[]", vec![]),
+            ("('a', \"b\")", vec!["a", "b"]),
+            ("('a',)", vec!["a"]),
+            ("['a' \"it's\"\n 'c']", vec!["a", "it's", "c"]),
         ] {
             assert_eq!(python_list(text).unwrap(), items, "{text}");
         }
@@ -135,10 +147,14 @@ mod tests {
         }
         for text in [
             "['a'",
-            "['a' 'b']",
+            "['a' 'b', 'c']",
+            "['a', 'b' 'c']",
             "['a'] + x",
             "[open('x')]",
-            "('a', 'b')",
+            "('a')",
+            "('a' 'b')",
+            "(1, 2)",
+            "('a', 'b']",
             "['\\x4']",
             "a, b",
             "[,]",

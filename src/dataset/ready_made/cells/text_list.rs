@@ -4,10 +4,10 @@ use serde_json::Value;
 
 use super::python_list::{python_dict, python_list};
 
-/// Parses a list in JSON, or else in Python's notation; `None` if the text is not a list of scalars.
+/// Parses a list in JSON, or else in the notation of Python or NumPy; `None` if the text is not a list of scalars.
 pub(in crate::dataset::ready_made) fn parse_list(text: &str) -> Option<Vec<String>> {
     let text = text.trim();
-    if !text.starts_with('[') || !has_few_values(text) {
+    if !text.starts_with(['[', '(']) || !has_few_values(text) {
         return None;
     }
     serde_json::from_str::<Vec<Value>>(text)

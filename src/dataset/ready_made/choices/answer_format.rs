@@ -71,6 +71,14 @@ impl AnswerFormat {
         }
     }
 
+    /// Like [`Self::choice_index`], for a format that the user chose: a letter may be in lower case.
+    pub(super) fn chosen_choice_index(self, answer: &str, options: &OptionList) -> Option<usize> {
+        match self {
+            Self::Letter => self.choice_index(&answer.to_ascii_uppercase(), options),
+            Self::Text | Self::Index0 | Self::Index1 => self.choice_index(answer, options),
+        }
+    }
+
     /// Like [`Self::choice_index`], for a format that the user did not choose: numbers do not identify options that the text of the
     /// question lists by letter.
     pub(in crate::dataset::ready_made) fn inferred_choice_index(

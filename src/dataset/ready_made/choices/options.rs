@@ -72,9 +72,14 @@ impl Options {
     }
 }
 
-/// Error message for a cell that is not a list of options.
+/// Error message for a cell that is not a list of options, with the sign that probably separates them.
 fn not_a_list(column: &Column, cell: &Cell) -> String {
-    let split = format!("{}:split(|)", column.name);
+    let text = cell.text().unwrap_or_default();
+    let separator = [("\n", r"\n"), ("|", "|"), (";", ";"), (",", ",")]
+        .into_iter()
+        .find(|(sign, _)| text.contains(sign))
+        .map_or("|", |(_, name)| name);
+    let split = format!("{}:split({separator})", column.name);
     format!(
         "the column {:?} holds no list of options: {}; --map options={} names the signs between them",
         column.name,

@@ -12,6 +12,7 @@ use crate::dataset::ready_made::columns::names::Role;
 use crate::dataset::ready_made::columns::{Column, Roles, answer_column, describe_columns};
 use crate::dataset::ready_made::items::{AnswerCell, Item};
 use crate::dataset::ready_made::omissions::{OmissionReason, Omissions};
+use crate::text::words::counted;
 use crate::types::Choices;
 use crate::types::text::excerpt;
 
@@ -49,15 +50,11 @@ pub(in crate::dataset::ready_made) fn find_truths(
     omissions: &mut Omissions,
 ) -> Result<Truths, String> {
     if roles.answers.is_empty() && items.iter().all(|item| item.options.is_none()) {
-        for item in items {
-            omissions.add(OmissionReason::Open, || {
-                format!(
-                    "not in a column that is known ({})",
-                    table.place_in_set(item.row)
-                )
-            });
-        }
-        return Ok(Truths::default());
+        return Err(format!(
+            "neither options nor answers among its columns: --map options=COLUMN,answer=COLUMN names them, and --map answer=COLUMN \
+             those of yes/no questions; --ask FILE asks questions without answers about every image. Its columns:\n{}",
+            describe_columns(table)
+        ));
     }
     if roles.answers.is_empty() {
         let remedy = answer_column::suggest_column(table, roles, &items).map_or_else(
@@ -303,7 +300,7 @@ impl ColumnFormat {
     /// Index of the option that an answer identifies.
     fn choice_index(&self, answer: &str, options: &OptionList) -> Option<usize> {
         if self.is_chosen {
-            self.format.choice_index(answer, options)
+            self.format.chosen_choice_index(answer, options)
         } else {
             self.format.inferred_choice_index(answer, options)
         }
@@ -318,11 +315,11 @@ impl ColumnFormat {
             Some(truth) => Choices::with_truth(Arc::clone(&options.texts), Some(truth))
                 .map_err(|e| e.to_string()),
             None => Err(format!(
-                "the answer {:?} is not one of the options {} (read as {}, which fits {} rows)",
+                "the answer {:?} is not one of the options {} (read as {}, which fits {})",
                 excerpt(answer, 60),
                 options.excerpt(120),
                 self.format.name(),
-                self.fitting_rows
+                counted(self.fitting_rows, "row")
             )),
         }
     }

@@ -139,7 +139,8 @@ fn parse_entry(text: &str) -> Result<MapEntry, String> {
                 .and_then(|rest| rest.strip_suffix(')'))
                 .filter(|separator| !separator.is_empty())
                 .ok_or("options=COLUMN:split(|) expected, with the signs between options")?;
-            (column, CellFormat::Split(separator.to_owned()))
+            let separator = separator.replace("\\n", "\n").replace("\\t", "\t");
+            (column, CellFormat::Split(separator))
         }
         (Role::Answer, Some((column, name))) => {
             let format = AnswerFormat::from_name(name).ok_or_else(|| {
@@ -210,6 +211,11 @@ mod tests {
         assert_eq!(
             comma.entry(Role::Options).unwrap().format,
             CellFormat::Split(",".into())
+        );
+        let line_break: ColumnMap = r"options=all:split(\n)".parse().unwrap();
+        assert_eq!(
+            line_break.entry(Role::Options).unwrap().format,
+            CellFormat::Split("\n".into())
         );
     }
 

@@ -10,7 +10,7 @@ use serde_json::{Map, Value};
 use super::super::cells::{Cell, JsonUnit, RowPlace, Table};
 use super::json_scan::{JsonScanner, JsonValue, MAX_ROW_BYTES, ValueKind};
 use crate::error::{Error, Result};
-use crate::files::reading::{self, nan_problem};
+use crate::files::reading::{self, json_problem};
 use crate::types::shell_word;
 
 type FileScanner = JsonScanner<BufReader<File>>;
@@ -70,7 +70,7 @@ pub(super) fn read_lines(path: &Path, table: &mut Table) -> Result<()> {
         if !bytes.trim_ascii().is_empty() {
             check_values(bytes).map_err(|problem| Error::line(path, number, problem))?;
             let value =
-                serde_json::from_slice(bytes).map_err(|e| match nan_problem(bytes, &e) {
+                serde_json::from_slice(bytes).map_err(|e| match json_problem(bytes, &e) {
                     Some(problem) => Error::line(path, number, problem),
                     None => Error::json_line(path, number, &e),
                 })?;
@@ -196,7 +196,7 @@ fn parse_object(value: &JsonValue, number: u64) -> Result<Map<String, Value>, St
     match serde_json::from_slice(&value.bytes) {
         Ok(Value::Object(fields)) => Ok(fields),
         Ok(_) => Err(format!("value {number} of the list is not an object")),
-        Err(e) => match nan_problem(&value.bytes, &e) {
+        Err(e) => match json_problem(&value.bytes, &e) {
             Some(problem) => Err(format!("object {number}: {problem}")),
             None => Err(format!(
                 "object {number}, at byte {}: {e}",

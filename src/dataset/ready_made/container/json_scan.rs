@@ -5,6 +5,8 @@
 
 use std::io::{self, BufRead};
 
+use crate::files::reading::NOT_UTF8;
+
 /// Maximum length of a row, in bytes: enough for an image of 48 MB in base64.
 pub(super) const MAX_ROW_BYTES: usize = 64 << 20;
 
@@ -61,6 +63,7 @@ impl<R: BufRead> JsonScanner<R> {
             match self.peek()? {
                 Some(b' ' | b'\t' | b'\r' | b'\n') => self.skip(),
                 Some(0xEF) if self.offset == 0 => (0..3).for_each(|_| self.skip()),
+                Some(0xFE | 0xFF) => return Err(NOT_UTF8.to_owned()),
                 Some(byte) => return Ok(byte),
                 None => return Err(format!("the file ends at byte {}", self.offset)),
             }

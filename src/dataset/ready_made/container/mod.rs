@@ -3,6 +3,7 @@
 mod archive;
 mod card;
 mod choose;
+mod class_labels;
 mod decompress;
 mod find;
 mod json;

@@ -18,6 +18,7 @@ use parquet::file::serialized_reader::SerializedPageReader;
 use parquet::record::{Field, Row as Record};
 
 use super::super::cells::{Cell, MAX_ROWS, RowPlace, Step, Table, parse_list, too_many_rows};
+use super::class_labels::ClassLabels;
 use super::json_scan::MAX_ROW_BYTES;
 use crate::error::{Error, Result};
 use crate::files::guarded::guarded;
@@ -79,6 +80,7 @@ pub(super) fn read(path: &Path, footer: &Footer, table: &mut Table) -> Result<()
     if usize::try_from(stated).is_ok_and(|rows| rows > MAX_ROWS) {
         return Err(Error::data(path.display(), too_many_rows()));
     }
+    let labels = ClassLabels::new(metadata.file_metadata());
     let file = open(path)?;
     let mut columns: Vec<(String, usize)> = Vec::new();
     let mut too_long = None;
@@ -99,7 +101,8 @@ pub(super) fn read(path: &Path, footer: &Footer, table: &mut Table) -> Result<()
                 columns.truncate(index);
                 columns.push((name, column));
             }
-            cells.push((columns[index].1, convert_field(field)));
+            let (name, column) = &columns[index];
+            cells.push((*column, labels.named(name, convert_field(field))));
         }
         table.push(place, cells)
     };

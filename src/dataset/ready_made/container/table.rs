@@ -47,6 +47,9 @@ struct QuoteCheck {
     first_line: usize,
     /// First line of a cell of several lines whose closing quote is followed by text.
     fault: Option<usize>,
+    last_byte: u8,
+    /// Whether a record ends with CR and LF, as spreadsheets write. The reader ends it at CR, and takes LF for the start of the next.
+    has_crlf: bool,
 }
 
 /// Position in a cell.
@@ -67,6 +70,8 @@ impl QuoteCheck {
             line: 1,
             first_line: 1,
             fault: None,
+            last_byte: 0,
+            has_crlf: false,
         }
     }
 
@@ -90,6 +95,9 @@ impl QuoteCheck {
                 (CellState::Start | CellState::Unquoted, _) => CellState::Unquoted,
             };
             self.line += usize::from(byte == b'\n');
+            self.has_crlf |=
+                (self.last_byte, byte) == (b'\r', b'\n') && matches!(self.state, CellState::Start);
+            self.last_byte = byte;
         }
     }
 
@@ -164,22 +172,20 @@ pub(super) fn read(path: &Path, delimiter: u8, table: &mut Table) -> Result<()> 
     let mut number = 0;
     loop {
         number += 1;
-        let line = reader.position().line();
+        let mut position = reader.position().clone();
         reader.get_mut().start_record();
-        let has_record = reader.read_byte_record(&mut record).map_err(|e| {
+        let result = reader.read_byte_record(&mut record);
+        position.set_line(position.line() + u64::from(reader.get_ref().quotes.has_crlf));
+        let line = position.line();
+        let has_record = result.map_err(|e| {
             let place = format!("{}, record {number}, line {line}", path.display());
             Error::data(place, e)
         })?;
         if !has_record {
             break;
         }
-        let position = record.position().cloned().unwrap_or_else(Position::new);
-        let row_error = |problem: String| {
-            Error::data(
-                format_args!("{}, line {}", path.display(), position.line()),
-                problem,
-            )
-        };
+        let row_error =
+            |problem: String| Error::data(format_args!("{}, line {line}", path.display()), problem);
         if let Some(stray) = record
             .iter()
             .skip(columns.len())

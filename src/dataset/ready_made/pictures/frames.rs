@@ -232,10 +232,6 @@ impl<'a> Frames<'a> {
     /// Improves the error for a path in a row: says if the text is not a path, and suggests a column of the row that has an image.
     fn explain_path_error(&self, row: usize, text: &str, problem: String) -> String {
         let problem = explain_non_path(text, problem);
-        let with_slashes = text.replace('\\', "/");
-        if with_slashes != text && self.file(row, &with_slashes).is_ok() {
-            return format!("{problem}; the file {with_slashes:?} exists: write / in place of \\");
-        }
         let row = &self.table.rows[row];
         let image_column =
             self.table

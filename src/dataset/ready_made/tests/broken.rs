@@ -206,13 +206,29 @@ fn csv_may_have_tabs() {
 }
 
 #[test]
+fn lines_of_windows_are_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("set.csv");
+    let rows = [
+        "image,question,A,B,answer",
+        "a.png,\"Is it\r\nred?\",x,y,A",
+        "a.png,Is it?,x,x,B",
+    ];
+    for ending in ["\n", "\r\n"] {
+        std::fs::write(&path, rows.join(ending) + ending).unwrap();
+        let problem = refusal(&path, &SetArgs::default());
+        assert!(problem.contains("the first: line 4: "), "{problem}");
+    }
+}
+
+#[test]
 fn backslash_in_path_is_named() {
     let (folder, path) = set("set.json", &[question(1, "images\\a.png")]);
     std::fs::create_dir(folder.path().join("images")).unwrap();
     std::fs::write(folder.path().join("images/a.png"), "").unwrap();
     let problem = refusal(&path, &SetArgs::default());
     assert!(
-        problem.contains("the file \"images/a.png\" exists: write / in place of \\;"),
+        problem.contains("; it is named \"images/a.png\": write this in the data;"),
         "{problem}"
     );
 }

@@ -9,6 +9,7 @@ use base64::engine::general_purpose::STANDARD;
 use image::{ImageFormat, RgbImage};
 use parquet::basic::{Compression, LogicalType, Repetition, Type as Physical};
 use parquet::data_type::{ByteArray, ByteArrayType, Int64Type};
+use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
 use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::{Type, TypePtr};
@@ -60,7 +61,7 @@ pub(super) fn write(path: &Path, rows: &[Map<String, Value>]) {
         }),
         "tsv" => table(rows, b'\t'),
         "csv" => table(rows, b','),
-        "parquet" => return parquet(path, rows),
+        "parquet" => return parquet(path, rows, None),
         other => panic!("no form {other}"),
     };
     fs::write(path, text).unwrap();
@@ -178,8 +179,21 @@ impl Levels {
     }
 }
 
+/// A Parquet file whose metadata have these features, as the library `datasets` writes them.
+pub(super) fn set_with_features(
+    rows: &[Map<String, Value>],
+    features: &Value,
+) -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("set.parquet");
+    let info = serde_json::json!({"info": {"features": features}});
+    let metadata = KeyValue::new("huggingface".to_owned(), info.to_string());
+    parquet(&path, rows, Some(vec![metadata]));
+    (folder, path)
+}
+
 /// Writes a Parquet file of two row groups, with the column types that hubs use.
-fn parquet(path: &Path, rows: &[Map<String, Value>]) {
+fn parquet(path: &Path, rows: &[Map<String, Value>], metadata: Option<Vec<KeyValue>>) {
     let columns = columns(rows);
     let text = Some(LogicalType::String);
     let forms: Vec<Form> = columns.iter().map(|column| form(rows, column)).collect();
@@ -199,6 +213,7 @@ fn parquet(path: &Path, rows: &[Map<String, Value>]) {
     );
     let properties = WriterProperties::builder()
         .set_compression(Compression::SNAPPY)
+        .set_key_value_metadata(metadata)
         .build();
     let file = File::create(path).unwrap();
     let mut writer = SerializedFileWriter::new(file, schema, Arc::new(properties)).unwrap();

@@ -181,3 +181,50 @@ fn bad_rows_are_left_out_up_to_a_share() {
     };
     assert_eq!(open(&path, &raised).unwrap().questions().len(), 9);
 }
+
+#[test]
+fn questions_alone_name_their_columns() {
+    let (_folder, path) = with(&[json!({"question_type": "is there", "verdict": "yes"})]);
+    let problem = refusal(&path, &SetArgs::default());
+    assert!(
+        problem.contains("neither options nor answers among its columns")
+            && problem.contains("--map answer=COLUMN those of yes/no questions")
+            && problem.contains("verdict"),
+        "{problem}"
+    );
+    assert_eq!(answer_read_as(&path, "answer=verdict"), "yes");
+}
+
+#[test]
+fn lower_case_letters_are_read_as_told() {
+    let (_folder, path) = with(&[json!({"options": ["x", "y"], "answer": "b"})]);
+    assert!(refusal(&path, &SetArgs::default()).contains("neither by letter nor by text"));
+    assert_eq!(answer_read_as(&path, "answer=answer:letter"), "y");
+}
+
+#[test]
+fn separator_of_options_is_proposed() {
+    for (options, split) in [
+        ("red|blue, dark", "options:split(|)"),
+        ("red; blue", "options:split(;)"),
+        ("A. red\nB. blue", r"options:split(\n)"),
+    ] {
+        let (_folder, path) = with(&[json!({"options": options, "answer": "red"})]);
+        let problem = refusal(&path, &SetArgs::default());
+        assert!(problem.contains(split), "{problem}");
+        assert_eq!(answer_read_as(&path, &format!("options={split}")), "red");
+    }
+}
+
+#[test]
+fn column_of_image_numbers_is_proposed() {
+    let rows = [row(
+        json!({"id": 1, "imageId": 7, "question": "?", "options": ["x", "y"], "answer": "x"}),
+    )];
+    let (_folder, path) = set("set.json", &rows);
+    let problem = refusal(&path, &SetArgs::default());
+    assert!(
+        problem.contains("--map image='images/{imageId}.jpg'"),
+        "{problem}"
+    );
+}

@@ -5,7 +5,7 @@ use std::fs;
 use serde_json::{Map, Value, json};
 
 use super::super::settings::{LeaveOut, SeveralImages};
-use super::fixture::{base64, bytes, png, row, set, write};
+use super::fixture::{base64, bytes, png, row, set, set_with_features, write};
 use super::{Read, digests, expected, map, open, read};
 use crate::dataset::ready_made::SetArgs;
 
@@ -527,4 +527,31 @@ pub(super) fn pack(path: &std::path::Path, entries: &[(&str, &[u8])]) {
         std::io::Write::write_all(&mut zip, bytes).unwrap();
     }
     zip.finish().unwrap();
+}
+
+/// Answers of two rows with these fields, whose column `answer` has the classes 0 and 1 with these names.
+fn class_answers(names: [&str; 2], fields: &Value) -> Vec<String> {
+    let rows = [0, 1].map(|class| {
+        let mut row = row(fields.clone());
+        row.insert("image".to_owned(), json!(base64(class)));
+        row.insert("answer".to_owned(), json!(class));
+        row
+    });
+    let features = json!({"answer": {"names": names, "_type": "ClassLabel"}});
+    let (_folder, path) = set_with_features(&rows, &features);
+    let set = open(&path, &SetArgs::default()).unwrap();
+    read(&set).into_iter().map(|read| read.4).collect()
+}
+
+#[test]
+fn class_labels_are_read_by_name() {
+    let yes_or_no = json!({"question": "Is it red?"});
+    assert_eq!(class_answers(["yes", "no"], &yes_or_no), ["yes", "no"]);
+    assert_eq!(class_answers(["no", "yes"], &yes_or_no), ["no", "yes"]);
+    let listed = json!({"question": "Which?", "options": ["cup", "ball"]});
+    assert_eq!(class_answers(["ball", "cup"], &listed), ["ball", "cup"]);
+    assert_eq!(class_answers(["B", "A"], &listed), ["ball", "cup"]);
+    let columns = json!({"question": "Which?", "option1": "cup", "option2": "ball"});
+    let numbered = class_answers(["option1", "option2"], &columns);
+    assert_eq!(numbered, ["cup", "ball"]);
 }

@@ -21,6 +21,9 @@ const MAX_LINE_BYTES: u64 = 4 << 20;
 /// Size limit of any other file that is read at once, in bytes. Chosen: the largest published lists of questions have a tenth of it.
 const MAX_BYTES: u64 = 1 << 30;
 
+/// Error message for text in UTF-16 or an older encoding.
+pub const NOT_UTF8: &str = "not UTF-8; save the file as UTF-8";
+
 /// The paths in a folder, sorted by name.
 ///
 /// # Errors
@@ -142,9 +145,13 @@ pub fn json<T: DeserializeOwned>(path: &Path) -> Result<T> {
     serde_json::from_str(&text(path)?).map_err(|e| Error::data(path.display(), e))
 }
 
-/// Error message for text that is not JSON because of a `NaN` or `Infinity`, as Python writes them; `None` for other faults.
+/// Error message for text that is not JSON because it is not UTF-8, or has a `NaN` or `Infinity`, as Python writes them; `None` for
+/// other faults.
 #[must_use]
-pub fn nan_problem(bytes: &[u8], error: &serde_json::Error) -> Option<&'static str> {
+pub fn json_problem(bytes: &[u8], error: &serde_json::Error) -> Option<&'static str> {
+    if str::from_utf8(bytes).is_err() {
+        return Some(NOT_UTF8);
+    }
     let line = bytes.split(|byte| *byte == b'\n').nth(error.line() - 1)?;
     let rest = line.get(error.column().saturating_sub(1)..)?;
     let rest = rest.strip_prefix(b"-").unwrap_or(rest);
@@ -180,13 +187,12 @@ pub fn json_lines<T: DeserializeOwned>(path: &Path) -> Result<Vec<(usize, T)>> {
             _ => &line[..],
         };
         if !text.trim_ascii().is_empty() {
-            let value =
-                serde_json::from_slice(text.trim_ascii_end()).map_err(|e| {
-                    match nan_problem(text, &e) {
-                        Some(problem) => Error::line(path, number, problem),
-                        None => Error::json_line(path, number, &e),
-                    }
-                })?;
+            let value = serde_json::from_slice(text.trim_ascii_end()).map_err(|e| {
+                match json_problem(text, &e) {
+                    Some(problem) => Error::line(path, number, problem),
+                    None => Error::json_line(path, number, &e),
+                }
+            })?;
             values.push((number, value));
         }
     }
@@ -218,6 +224,12 @@ mod tests {
         let error = json_lines::<u8>(&path).unwrap_err().to_string();
         assert!(
             error.contains("line 2: NaN or Infinity, which JSON does not have"),
+            "{error}"
+        );
+        fs::write(&path, b"\xFF\xFE1\0\n\0").unwrap();
+        let error = json_lines::<u8>(&path).unwrap_err().to_string();
+        assert!(
+            error.ends_with("line 1: not UTF-8; save the file as UTF-8"),
             "{error}"
         );
         fs::write(&path, vec![b' '; 1 + MAX_SETTINGS_BYTES as usize]).unwrap();

@@ -82,6 +82,9 @@ impl FileFormat {
             (b"MM\0+", Self::Tiff),
             (b"BM", Self::Bmp),
         ];
+        if file.is_empty() {
+            return Err("the file is empty (0 bytes)".to_owned());
+        }
         if has_signature(file, 0, b"RIFF") && has_signature(file, 8, b"WEBP") {
             return Ok(Self::WebP);
         }
@@ -169,7 +172,7 @@ mod tests {
                 b"RIFF\x10\0\0\0WAVE",
                 "not an image: PNG, JPEG, WebP, TIFF, BMP or OpenEXR expected",
             ),
-            (b"", "not an image"),
+            (b"", "the file is empty"),
             (b"ab", "not an image"),
         ] {
             let problem = FileFormat::detect(file).unwrap_err();

@@ -54,6 +54,12 @@ fn unsupported_images_are_refused_by_name() {
 }
 
 #[test]
+fn empty_file_is_called_empty() {
+    let error = image_file(Vec::new(), "a.png").check().unwrap_err();
+    assert_eq!(error.to_string(), "a.png: the file is empty (0 bytes)");
+}
+
+#[test]
 fn a_truncated_file_is_named() {
     let mut picture = png(&GrayImage::new(64, 64).into());
     picture.bytes.truncate(picture.bytes.len() / 2);

@@ -93,12 +93,15 @@ pub(super) fn check_images(
             counted(unusable, "image")
         ));
     }
-    findings.ok(format!(
-        "{}, {}, {}",
-        counted(shown.len(), "image"),
-        megabytes(total_bytes),
-        size_list(&sizes)
-    ));
+    let usable = shown.len() - unusable;
+    if usable > 0 {
+        findings.ok(format!(
+            "{}, {}, {}",
+            counted(usable, "image"),
+            megabytes(total_bytes),
+            size_list(&sizes)
+        ));
+    }
     for line in notes.lines() {
         findings.warn(line);
     }

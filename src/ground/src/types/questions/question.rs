@@ -124,8 +124,13 @@ impl Choices {
     /// [`Error::Data`] at the place `choices`.
     pub fn with_truth(texts: Arc<[String]>, truth: Option<usize>) -> Result<Self, Error> {
         if !(2..=Self::MOST).contains(&texts.len()) {
+            let noun = if texts.len() == 1 {
+                "choice"
+            } else {
+                "choices"
+            };
             return choices_error(format!(
-                "{} choices: a question needs 2 to {}",
+                "{} {noun}: a question needs 2 to {}",
                 texts.len(),
                 Self::MOST
             ));
