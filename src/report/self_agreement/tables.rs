@@ -9,8 +9,9 @@ use crate::tables::{
 use crate::text::table::ColumnKind::{self, Count, Number, Percent, Ratio, Share, Text};
 use crate::text::table::SUMMARY;
 use crate::text::table::{Table, TableBuilder, TableCell, TableFormat};
-use crate::text::words::{counted, light};
+use crate::text::words::light;
 use crate::types::RunGroup;
+use crate::types::text::counted;
 use darkqa_score::answers::confusion::{Confusion, Hallucination};
 use darkqa_score::choice::ParsingMode;
 use darkqa_score::comparisons::self_agreement::SelfAgreement;
@@ -94,7 +95,7 @@ fn role(cell: &AgreementCell) -> &'static str {
     }
 }
 
-/// Answers at L0 of the model of a cell, by the same way of parsing.
+/// Answers at L0 of the model of a cell, by the same way of parsing; `None` for one family, because they are counted over all.
 fn answers_at_l0<'a>(
     found: &'a SelfAgreement<'_>,
     cell: &AgreementCell,
@@ -102,6 +103,7 @@ fn answers_at_l0<'a>(
     found
         .light
         .iter()
+        .filter(|_| cell.family.is_none())
         .find(|light| light.model == cell.subject.model && light.mode == cell.mode)
 }
 

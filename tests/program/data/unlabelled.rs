@@ -162,6 +162,11 @@ fn report_measures_agreement_with_l0() {
     assert_eq!(of("L0")["role"], "ceiling");
     // The floor is no to everything, too, so that nothing is kept at L5.
     assert!(number(of("L5"), "evidence").abs() < 1e-12 && number(of("L5"), "kappa").abs() < 1e-12);
+    // The numbers of answers at L0 are over all families.
+    for row in &own {
+        let is_whole = row["family"] == "all";
+        assert_eq!(row["asked_light"] == "36", is_whole, "{row:?}");
+    }
     assert!(number(of("L5"), "entropy").abs() < 1e-12 && number(of("L5"), "entropy_light") > 0.5);
     // Of the last two photographs one has a window.
     assert!((number(of("L1"), "agreement") - 35.0 / 36.0).abs() < 1e-12);
