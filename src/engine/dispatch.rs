@@ -251,7 +251,7 @@ impl<I: Item> ReplySink<'_, I> {
                  leave it out, or send it smaller (--image max-side=N)"
             );
         }
-        self.first_failures.warn(&self.dispatcher.models, |model| {
+        self.first_failures.warn(self.dispatcher.models, |model| {
             self.breaker.is_stopped(model)
         });
         self.store.sync()?;
@@ -502,7 +502,9 @@ impl<I: Item> ReplySink<'_, I> {
                 let may_be_cause = self.suspects.may_be_cause(trial.model, source);
                 self.breaker
                     .failed(trial.model, error, source, may_be_cause);
-                self.first_failures.add(trial.model, source, &error.failure);
+                if error.reach == Reach::Trial {
+                    self.first_failures.add(trial.model, source, &error.failure);
+                }
                 // If the endpoint is the cause or the run ends, the trial does not count as asked, unless it cost something.
                 if error.reach != Reach::Trial && error.lost.is_none() {
                     return Ok(());
