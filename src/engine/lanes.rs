@@ -7,7 +7,7 @@ use crate::engine::models::ModelUnderTest;
 use crate::engine::open_files::RequestLimit;
 use crate::images::trials::{Stimulus, Trial};
 use crate::images::workers::ThreadArgs;
-use crate::text::words::counted;
+use crate::types::text::counted;
 
 /// Maximum bytes of images held so that idle endpoints can work ahead of the slowest; chosen: about fifty images of 1280×720 as PNG.
 const BYTES_AHEAD: usize = 64 << 20;

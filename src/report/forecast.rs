@@ -10,8 +10,8 @@ use crate::report::power::PowerForecast;
 use crate::text::table::ColumnKind::{Count, Text};
 use crate::text::table::TableBuilder;
 use crate::text::terminal;
-use crate::text::words::counted;
 use crate::types::ProfileName;
+use crate::types::text::counted;
 
 /// Estimate for the remaining requests of one model.
 #[derive(Debug, Clone, PartialEq, Serialize)]

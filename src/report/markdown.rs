@@ -13,7 +13,8 @@ use crate::sentences::how_to_read;
 use crate::text::alert::Alert;
 use crate::text::readable::readable;
 use crate::text::table::{Column, ColumnKind, Table, TableFormat};
-use crate::text::words::{counted, ends, interval, words};
+use crate::text::words::{ends, interval, words};
+use crate::types::text::counted;
 
 /// Name of the table of accuracies or scores by level.
 const LEVELS: &str = "levels";

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::text::words::counted;
+use crate::types::text::counted;
 use darkqa_score::cluster::{ClusterUnit, Clusters};
 use darkqa_score::comparisons::paired::POWER;
 use darkqa_score::power::{CHANGED, CORRELATION, Detectable, PlannedSample, TARGET};

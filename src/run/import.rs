@@ -31,8 +31,9 @@ use crate::import::{
 use crate::picture::ImageFile;
 use crate::picture::png;
 use crate::runs::Outcome;
-use crate::text::words::{counted, first_names};
+use crate::text::words::first_names;
 use crate::types::manifests::Status;
+use crate::types::text::counted;
 use crate::types::{Decides, FrameId, InputNote, Rgb, shell_word};
 
 /// Plausible typical depths of indoor frames, in millimetres (chosen). Outside this range, the depth scale is probably wrong.

@@ -14,9 +14,9 @@ use crate::images::trials::questions::open_data;
 use crate::picture::DecodeRule;
 use crate::picture::png;
 use crate::runs::Outcome;
-use crate::text::words::counted;
 use crate::types::manifests::Status;
 use crate::types::questions::letter;
+use crate::types::text::counted;
 use crate::types::{Decides, FrameId, Question, shell_word};
 use darkqa_questions::rules::Rules;
 

@@ -15,8 +15,8 @@ use crate::images::workers::{ThreadArgs, pool};
 use crate::picture::{exr, png};
 use crate::rooms::{self, Room, Rooms};
 use crate::runs::Outcome;
-use crate::text::words::counted;
 use crate::types::manifests::Status;
+use crate::types::text::counted;
 use crate::types::{Decides, FrameId, Labels, SegmentName};
 
 /// The flags of `rooms`.

@@ -7,8 +7,8 @@ use serde_json::Value;
 use crate::ask::{Price, Prices};
 use crate::error::Result;
 use crate::report::forecast::money;
-use crate::text::words;
 use crate::types::manifests::RunManifest;
+use crate::types::text;
 use crate::types::{TrialRef, Via};
 use darkqa_score::answers::record::Detail;
 
@@ -149,14 +149,14 @@ pub(super) fn cost_text<'t, D: Detail + 't>(
         attempts => format!(
             ", {} of it for {} without a usable reply",
             money(lost_dollars),
-            words::counted(attempts as usize, "attempt")
+            text::counted(attempts as usize, "attempt")
         ),
     };
     let note = match unknown {
         0 => String::new(),
         n => format!(
             "; {} without a known price or usage",
-            words::plural(n, "reply", "replies")
+            text::plural(n, "reply", "replies")
         ),
     };
     let (source, all) = (run.source(), money(dollars + lost_dollars));

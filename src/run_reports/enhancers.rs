@@ -5,8 +5,8 @@ use std::collections::BTreeSet;
 use super::join::JoinedRun;
 use crate::tables::EnhancerRow;
 use crate::text::alert::{Alert, AlertKind};
-use crate::text::words::counted;
 use crate::types::manifests::{ELSEWHERE, EnhancerNote, JudgedImages, ProbeOutcome, TRAINED_ON};
+use crate::types::text::counted;
 
 /// One row for each enhancer and way of using it. Runs that used it in the same way share a row.
 pub(super) fn rows(runs: &[JoinedRun]) -> Vec<EnhancerRow> {

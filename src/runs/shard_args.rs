@@ -5,8 +5,8 @@ use clap::Args;
 use crate::error::{Error, Result};
 use crate::runs::shard::Shard;
 use crate::runs::shard_sources::{WeightedSource, shard_range};
-use crate::text::words::counted;
 use crate::types::Decides;
+use crate::types::text::counted;
 
 /// The `--shard` flag.
 #[derive(Debug, Clone, Default, Args)]

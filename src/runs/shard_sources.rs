@@ -6,8 +6,8 @@ use std::ops::Range;
 
 use crate::error::{Error, Result};
 use crate::runs::shard::Shard;
-use crate::text::words::plural;
 use crate::types::manifests::PartPlace;
+use crate::types::text::plural;
 
 /// The questions about the sources of a shard, with the place of these sources. The place is `None` if the run is not divided.
 ///

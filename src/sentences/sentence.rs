@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::text::words::{counted, points};
+use crate::text::words::points;
+use crate::types::text::counted;
 use crate::types::{EnhancerName, ModelListing};
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::{Claim, PooledFinding};

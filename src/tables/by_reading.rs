@@ -6,6 +6,7 @@ use crate::text::table::ColumnKind::{Count, Number, P, Text};
 use crate::text::table::{ColumnHeads, Table, TableBuilder, TableCell};
 use crate::text::words::{self, ends_in_points, points, reach, stops};
 use crate::types::degradations::Kind;
+use crate::types::text::counted;
 use crate::types::{AxisLevel, ProfileName};
 use darkqa_score::accuracies::Curve;
 use darkqa_score::comparisons::{
@@ -329,7 +330,7 @@ fn notes(found: &[FindingByProfile]) -> Vec<String> {
     if let Some(dropped) = dropped.filter(|dropped| *dropped > 0) {
         notes.push(format!(
             "left out because a side has no reply: up to {}",
-            words::counted(dropped, "item")
+            counted(dropped, "item")
         ));
     }
     notes

@@ -2,7 +2,7 @@
 
 use crate::text::table::ColumnKind::{Count, Percent, Share, Text};
 use crate::text::table::{Table, TableBuilder, TableCell, TableFormat};
-use crate::text::words::counted;
+use crate::types::text::counted;
 use crate::types::{Family, RunGroup, Variant};
 use darkqa_score::accuracies::{GroupCell, GroupChance, StrictScore};
 use darkqa_score::choice::ParsingMode;

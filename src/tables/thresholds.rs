@@ -4,9 +4,10 @@ use std::collections::BTreeSet;
 
 use crate::text::table::ColumnKind::{Number, Share, Text, Threshold};
 use crate::text::table::{Table, TableBuilder, TableCell};
-use crate::text::words::{counted, light, plural};
+use crate::text::words::light;
 use crate::types::AxisLevel;
 use crate::types::degradations::Axis;
+use crate::types::text::{counted, plural};
 use darkqa_score::accuracies::Curve;
 use darkqa_score::choice::ParsingMode;
 use darkqa_score::findings::Findings;

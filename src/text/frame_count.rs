@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::text::words::counted;
+use crate::types::text::counted;
 use crate::types::{FrameId, SentImages};
 use darkqa_score::grid::Grid;
 

@@ -37,16 +37,6 @@ pub(crate) fn name(subject: &ModelInCondition) -> String {
     format!("{} {}", subject.model, subject.condition())
 }
 
-/// A count with its noun; the plural adds an s: `1 pair`, `2 pairs`.
-pub(crate) fn counted(number: usize, noun: &str) -> String {
-    plural(number, noun, &format!("{noun}s"))
-}
-
-/// A count with its noun, given in singular and plural: `1 reply`, `2 replies`.
-pub(crate) fn plural(number: usize, one: &str, several: &str) -> String {
-    format!("{number} {}", if number == 1 { one } else { several })
-}
-
 /// Shortens a name to `width` characters by replacing its middle with `…`. Shorter names are unchanged.
 pub(crate) fn shorten_middle(name: &str, width: usize) -> String {
     let chars: Vec<char> = name.chars().collect();

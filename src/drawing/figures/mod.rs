@@ -16,8 +16,9 @@ use std::collections::BTreeSet;
 
 use crate::drawing::chart::figure_chart::FigureChart;
 use crate::drawing::chart::{Chart, DarkMark, LineContent, LineItems, LineStyle, Panel, PlotLine};
-use crate::text::words::{counted, family as family_name, light_with, names_enhancer};
+use crate::text::words::{family as family_name, light_with, names_enhancer};
 use crate::types::degradations::{Axis, Kind};
+use crate::types::text::counted;
 use crate::types::{AxisLevel, EnhancerName, Family, Variant, View};
 use darkqa_score::choice::ParsingMode;
 use darkqa_score::estimate::Estimate;

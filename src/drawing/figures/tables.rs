@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 
 use super::{FigureBuilder, Names};
 use crate::text::table::{Column, ColumnHeads, ColumnKind, Table, TableCell, TableRow};
-use crate::text::words::{counted, family as family_name};
+use crate::text::words::family as family_name;
 use crate::types::degradations::{Axis, Kind};
+use crate::types::text::counted;
 use crate::types::{AxisLevel, EnhancerName, Family, Variant, View};
 use darkqa_score::choice::ParsingMode;
 use darkqa_score::comparisons::PooledKind;

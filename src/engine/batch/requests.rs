@@ -13,7 +13,7 @@ use crate::engine::models::ModelUnderTest;
 use crate::error::{Error, Result};
 use crate::images::trials::{Item, PreparedGroup, Stimulus, Trial};
 use crate::store::BATCH;
-use crate::text::words::counted;
+use crate::types::text::counted;
 
 /// Maximum tokens of a part, as a share of the tokens that may wait for batches; chosen below a half, so that one part can wait while
 /// another one is processed.

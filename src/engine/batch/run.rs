@@ -26,9 +26,9 @@ use crate::images::trials::{Item as _, Stimulus, Trial};
 use crate::report::forecast::money;
 use crate::runs::outcome::Outcome;
 use crate::store::StoredTrial;
-use crate::text::words::plural;
 use crate::types::TrialKey;
 use crate::types::manifests::Status;
+use crate::types::text::plural;
 
 /// Maximum number of further batches for requests without a reply; chosen.
 const MAX_REPEATS: usize = 3;

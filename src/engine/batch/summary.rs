@@ -1,6 +1,6 @@
 //! The state of a run's parts as text: [`lines`].
 
-use crate::text::words::counted;
+use crate::types::text::counted;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 

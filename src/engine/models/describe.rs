@@ -8,7 +8,7 @@ use super::settings::{AskSettings, ModelSettings};
 use super::{endpoint, open};
 use crate::ask::{Message, Model};
 use crate::error::{Error, Result};
-use crate::text::words::counted;
+use crate::types::text::counted;
 
 /// Lines about each model: its name, its endpoint, the source of its key, its request, and the digest that is part of its trial keys.
 ///

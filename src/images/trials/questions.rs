@@ -15,7 +15,7 @@ use crate::files::reading;
 use crate::images::progress::Progress;
 use crate::images::trials::questions_by_rule::generate_by_rule;
 use crate::picture::DecodeRule;
-use crate::text::words::counted;
+use crate::types::text::counted;
 use crate::types::{Digest, Family, FrameId, Question};
 use darkqa_questions::rules::Rules;
 

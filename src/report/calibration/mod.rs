@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::text::table::ColumnKind::Text;
 use crate::text::table::TableBuilder;
 use crate::text::terminal;
-use crate::text::words::counted;
+use crate::types::text::counted;
 
 /// The calibration of a camera as JSON, with the ADU range and the bias of each setting.
 ///

@@ -7,8 +7,8 @@ use crate::drawing::chart::{Chart, Figure, LineContent, LineStyle, Panel, PlotLi
 use crate::drawing::paper::figure;
 use crate::error::Result;
 use crate::text::ladder::{Ladder, Series, SeriesByLevel};
-use crate::text::words::counted;
 use crate::types::AxisLevel;
+use crate::types::text::counted;
 use darkqa_score::model_in_condition::ModelInCondition;
 use darkqa_score::open::{Group, OpenCell};
 

@@ -11,8 +11,9 @@ use crate::error::Result;
 use crate::report::page::{OpenContent, page_of_open_questions};
 use crate::tables::Section;
 use crate::text::table::Table;
-use crate::text::words::{counted, percent, plural, points};
+use crate::text::words::{percent, points};
 use crate::types::degradations::Axis;
+use crate::types::text::{counted, plural};
 use darkqa_score::model_in_condition::ModelInCondition;
 use darkqa_score::open::{AnswerOutcome, Baseline, Group};
 

@@ -8,8 +8,9 @@ use crate::text::table::ColumnKind::{Accuracy, Count, Points, Share, Text};
 use crate::text::table::SUMMARY;
 use crate::text::table::{ColumnKind, Table, TableBuilder, TableCell};
 use crate::text::terminal::texts;
-use crate::text::words::{counted, ends};
+use crate::text::words::ends;
 use crate::types::degradations::Axis;
+use crate::types::text::counted;
 use darkqa_score::estimate::Estimate;
 use darkqa_score::open::{Baseline, Group, OpenCell, OpenSummary};
 

@@ -1,6 +1,6 @@
 //! Usage of a run: [`RunUsage`].
 
-use crate::text::words::counted;
+use crate::types::text::counted;
 use std::collections::BTreeSet;
 
 use crate::types::{ChoiceDetail, TrialRef, Usage};

@@ -15,8 +15,8 @@ use crate::text::csv as files;
 use crate::text::table::ColumnKind::{Count, Text};
 use crate::text::table::TableBuilder;
 use crate::text::terminal;
-use crate::text::words::counted;
 use crate::types::Family;
+use crate::types::text::counted;
 use darkqa_questions::summary::{Baselines, CandidateCounts, QuestionSummary};
 use darkqa_score::answers::checks::Checks;
 

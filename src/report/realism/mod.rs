@@ -14,7 +14,7 @@ use crate::error::{Error, Result};
 use crate::text::table::ColumnKind::{Count, Text};
 use crate::text::table::TableBuilder;
 use crate::text::terminal;
-use crate::text::words::counted;
+use crate::types::text::counted;
 use darkqa_score::photographs::realism::gain::ProfileFit;
 use darkqa_score::photographs::realism::mean::{MIN_VALUES, Mean};
 use darkqa_score::photographs::realism::residual::{Bins, EmptyBins};

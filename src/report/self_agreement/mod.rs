@@ -24,7 +24,7 @@ use crate::sentences::Sentence;
 use crate::text::alert::Alert;
 use crate::text::noise_profiles::NoiseProfiles;
 use crate::text::table::Table;
-use crate::text::words::counted;
+use crate::types::text::counted;
 use darkqa_score::comparisons::self_agreement::SelfAgreement;
 
 pub(crate) use agreement_report::AgreementReport;

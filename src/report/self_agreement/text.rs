@@ -12,9 +12,9 @@ use crate::report::report_length::ReportLength;
 use crate::report::short::findings::findings;
 use crate::text::noise_profiles::NoiseProfiles;
 use crate::text::terminal::{render, table};
-use crate::text::words::{counted, plural};
 use crate::text::wrapped::wrapped;
 use crate::types::manifests::RunManifest;
+use crate::types::text::{counted, plural};
 use darkqa_score::accuracies::Health;
 
 /// Renders the report as text. `runs` are the manifests with the folders of their runs.

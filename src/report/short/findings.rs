@@ -7,8 +7,8 @@ use crate::report::finding_groups::{Finding, FindingGroups};
 use crate::report::report_length::ReportLength;
 use crate::text::alert::{Alert, lines};
 use crate::text::terminal::line;
-use crate::text::words::counted;
 use crate::text::wrapped::wrapped;
+use crate::types::text::counted;
 use crate::types::text::escape_hidden;
 
 /// Width of the column of group titles, in characters.

@@ -9,7 +9,7 @@ use crate::error::Result;
 use crate::report::page::STYLE;
 use crate::report::template::render;
 use crate::text::readable::readable;
-use crate::text::words::counted;
+use crate::types::text::counted;
 
 const PAGE: &str = include_str!("index.html");
 const OWN_STYLE: &str = include_str!("site.css");

@@ -12,8 +12,8 @@ use crate::images::progress::Progress;
 use crate::images::trials::Plan;
 use crate::runs::Outcome;
 use crate::runs::run_plan::{NewPlan, PlannedFrame, recorded_command};
-use crate::text::words::counted;
 use crate::types::manifests::Status;
+use crate::types::text::counted;
 
 /// Writes the plan of a run into its folder. Nothing is asked.
 ///

@@ -17,7 +17,7 @@ use crate::import::recording::{
 use crate::picture::ImageFile;
 use crate::picture::decode_rule::DecodeRule;
 use crate::picture::raw_image::RawPixels;
-use crate::text::words::counted;
+use crate::types::text::counted;
 use crate::types::text::excerpt;
 use crate::types::{FrameId, Labels, Rgb};
 

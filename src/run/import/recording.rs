@@ -23,9 +23,10 @@ use crate::import::recording::{
     camera_name, seconds, stamp,
 };
 use crate::runs::Outcome;
-use crate::text::words::{counted, first_names};
+use crate::text::words::first_names;
 use crate::types::Decides;
 use crate::types::flags::positive;
+use crate::types::text::counted;
 
 /// Number of bytes at the start of a message that contain its time stamp.
 const STAMP_BYTES: u64 = 64;

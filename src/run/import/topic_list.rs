@@ -6,7 +6,8 @@ use std::path::Path;
 use crate::error::{Error, Result};
 use crate::import::recording::{Overview, TopicOverview};
 use crate::runs::Outcome;
-use crate::text::words::{counted, first_names};
+use crate::text::words::first_names;
+use crate::types::text::counted;
 
 /// Maximum number of topics in a message.
 pub(super) const MAX_NAMED: usize = 3;

@@ -16,8 +16,9 @@ use crate::images::progress::Progress;
 use crate::images::recipes::Recipe;
 use crate::images::trials::{check_enhanced, conditions};
 use crate::runs::shard_sources::shard_questions;
-use crate::text::words::{counted, first_names};
+use crate::text::words::first_names;
 use crate::types::manifests::PartPlace;
+use crate::types::text::counted;
 use crate::types::{Condition, FrameId, OpenDetail, QuestionId, Record, View};
 use darkqa_enhance::ModelFile;
 

@@ -18,8 +18,8 @@ use crate::images::workers::pool;
 use crate::picture::Payload;
 use crate::report::study::{StudyImage, StudyQuestion, page};
 use crate::runs::Outcome;
-use crate::text::words::counted;
 use crate::types::manifests::Status;
+use crate::types::text::counted;
 use crate::types::{Condition, Digest};
 use darkqa_enhance::ModelFile;
 

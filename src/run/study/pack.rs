@@ -14,8 +14,8 @@ use crate::report::study::{StudyImage, StudyQuestion, page};
 use crate::runs::Outcome;
 use crate::runs::image_rebuilder::{ImageRebuilder, RebuildArgs};
 use crate::runs::stored::StoredRun;
-use crate::text::words::{counted, plural};
 use crate::types::manifests::Status;
+use crate::types::text::{counted, plural};
 use crate::types::{
     ChoiceDetail, Condition, Decides, Digest, FrameId, QuestionId, RunQuestion, Trials,
 };

@@ -23,7 +23,7 @@ use crate::images::timings::Timings;
 use crate::images::workers::{ThreadArgs, pool};
 use crate::runs::Outcome;
 use crate::runs::shard_args::{ShardArgs, keep_shard};
-use crate::text::words::counted;
+use crate::types::text::counted;
 use crate::types::{Condition, Decides, Degradation, FrameId, Rgb, SetLight};
 use darkqa_light::{LightArgs, LightSettings, NoiseKey};
 

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::run_reports::join::JoinedRun;
 use crate::text::alert::{Alert, AlertKind};
-use crate::text::words::plural;
+use crate::types::text::plural;
 use crate::types::{ChoiceDetail, Trials};
 
 /// One alert for each model that was asked with `--request constrain` and has replies of another form. A reply that follows the

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::run_reports::join::{Joined, JoinedRun};
 use crate::text::alert::{Alert, AlertKind};
-use crate::text::words::plural;
+use crate::types::text::plural;
 use darkqa_score::answers::record::Detail;
 use darkqa_score::model_in_condition::without_run;
 

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use crate::text::alert::{Alert, AlertKind};
-use crate::text::words::plural;
 use crate::types::Trials;
+use crate::types::text::plural;
 use darkqa_score::answers::record::Detail;
 
 /// One alert for each model whose replies name several providers, with the number of replies of each.

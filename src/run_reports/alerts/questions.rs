@@ -6,7 +6,7 @@ use crate::run_reports::combine::Combined;
 use crate::run_reports::join::Joined;
 use crate::run_reports::settings::{has_human_answers, joined_with_and};
 use crate::text::alert::{Alert, AlertKind};
-use crate::text::words::counted;
+use crate::types::text::counted;
 use crate::types::{QuestionId, RunQuestion, TrialRef};
 use darkqa_score::answers::record::Detail;
 use darkqa_score::findings::Findings;

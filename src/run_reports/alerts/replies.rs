@@ -7,7 +7,7 @@ use crate::run_reports::combine::Combined;
 use crate::run_reports::settings::has_human_answers;
 use crate::text::alert::{Alert, AlertKind, MAX_UNREAD};
 use crate::text::outcome_words::failure_reason;
-use crate::text::words::counted;
+use crate::types::text::counted;
 use crate::types::{FailureKind, TrialRef, UnreadReason};
 use darkqa_score::accuracies::Health;
 

@@ -11,8 +11,8 @@ use crate::run_reports::settings::{
 };
 use crate::runs::mark_index::{JUDGE, PROTOCOL};
 use crate::runs::stored::{StoredRun, text_setting};
-use crate::text::words::counted;
 use crate::types::manifests::RunManifest;
+use crate::types::text::counted;
 use crate::types::{AxisLevel, Digest, OpenDetail, RunQuestion, Variant};
 
 /// Identity field with the digest of the prompts.

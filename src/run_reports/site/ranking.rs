@@ -6,7 +6,7 @@ use std::fmt::Write;
 use super::choice_member::ChoiceMember;
 use crate::report::site::{ChoiceRow, GroupRows, Ranking};
 use crate::run_reports::combine::clusters;
-use crate::text::words::plural;
+use crate::types::text::plural;
 use crate::types::{ChoiceDetail, ModelListing, RunQuestion, Trials};
 use darkqa_score::choice::ParsingMode;
 use darkqa_score::comparisons::{BestInTheDark, best_in_the_dark, rank_ranges};

@@ -5,8 +5,8 @@ use super::stored_shard::StoredShard;
 use crate::error::{Error, Result};
 use crate::runs::run_plan::RunPlan;
 use crate::runs::shard::Shard;
-use crate::text::words::counted;
 use crate::types::manifests::Status;
+use crate::types::text::counted;
 
 /// Treatment of sources of a run that are in no shard.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -12,9 +12,8 @@ use crate::dataset::ready_made::columns::names::Role;
 use crate::dataset::ready_made::columns::{Column, Roles, answer_column, describe_columns};
 use crate::dataset::ready_made::items::{AnswerCell, Item};
 use crate::dataset::ready_made::omissions::{OmissionReason, Omissions};
-use crate::text::words::counted;
 use crate::types::Choices;
-use crate::types::text::excerpt;
+use crate::types::text::{counted, excerpt};
 
 /// Question of a row with its choices, including the correct one.
 #[derive(Debug)]

@@ -10,7 +10,7 @@ use crate::engine::dark_already::{DarkImages, advice};
 use crate::error::Result;
 use crate::images::frames::first_question_per_frame;
 use crate::images::progress::Progress;
-use crate::text::words::counted;
+use crate::types::text::counted;
 use crate::types::{Digest, FrameId, InputNote, InputSummary, Question};
 use darkqa_enhance::brightness;
 

@@ -25,9 +25,9 @@ use crate::files::write;
 use crate::images::progress::Progress;
 use crate::images::trials::questions::{QuestionBank, open_data, rules, select};
 use crate::runs::Outcome;
-use crate::text::words::counted;
 use crate::types::Decides;
 use crate::types::Question;
+use crate::types::text::counted;
 use darkqa_light::LightSettings;
 use darkqa_score::tested_sentences::RunContents;
 

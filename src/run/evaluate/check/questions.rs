@@ -3,9 +3,10 @@
 use std::collections::{BTreeMap, HashMap};
 
 use super::findings::{Findings, Mark};
-use crate::text::words::{counted, first_names};
+use crate::text::words::first_names;
 use crate::types::Question;
 use crate::types::questions::letter;
+use crate::types::text::counted;
 use crate::types::text::excerpt;
 
 /// Share of one true answer or letter above which a constant reply scores well.
