@@ -256,7 +256,10 @@ pub(in crate::ask) fn page_title(body: &str) -> Option<String> {
             body.trim_start().get(from..from + length)
         })
         .map_or("", str::trim);
-    Some(format!("an HTML page titled {title:?}"))
+    Some(match title {
+        "" => "an HTML page without a title".to_owned(),
+        title => format!("an HTML page titled {title:?}"),
+    })
 }
 
 /// Parses the first JSON object in a text; `None` if there is none or it does not look like an error.
@@ -400,7 +403,7 @@ mod tests {
                 "an HTML page titled \"413 Too Large\"",
                 None,
             ),
-            ("\n<!DOCTYPE html><p>", "an HTML page titled \"\"", None),
+            ("\n<!DOCTYPE html><p>", "an HTML page without a title", None),
             (" upstream\n", "upstream", None),
             ("", "", None),
         ] {
