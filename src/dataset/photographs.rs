@@ -10,6 +10,7 @@ use super::{DataPlace, Dataset, SetArgs, frames, stem};
 use crate::error::{Error, Result};
 use crate::files::reading::entries;
 use crate::picture::image_file::format::SUPPORTED_FORMATS;
+use crate::types::text::counted;
 
 /// Images at a place, for questions that are asked about every image.
 #[derive(Debug)]
@@ -93,13 +94,10 @@ impl Photographs {
         found.warn_of_unsupported(folder);
         root.warn_of_links_out(&scan.links_out);
         if sources.keys().any(|id| id.0.contains('/')) {
-            let images = match sources.len() {
-                1 => "1 image".to_owned(),
-                n => format!("{n} images"),
-            };
             notes.push(format!(
-                "{}: {images} in it and in the folders below, each named by its path from there",
-                folder.display()
+                "{}: {} in it and in the folders below, each named by its path from there",
+                folder.display(),
+                counted(sources.len(), "image")
             ));
         }
         Ok(Self {

@@ -12,6 +12,7 @@ use super::folder::{FileKind, StoreFolder, StoredFile};
 use crate::error::{Error, Result};
 use crate::files::folder_access::FolderAccess;
 use crate::files::reading;
+use crate::types::text::counted;
 
 /// Number of bytes read from the end of a file for its facts; chosen (facts take less than 4 kB).
 const TAIL: u64 = 16 << 10;
@@ -78,10 +79,7 @@ pub(crate) fn listing(folder: &Path) -> Result<String> {
     }
     for (age_class, sum) in by_age.iter().enumerate().filter(|(_, sum)| sum.images > 0) {
         text += &sum.line(&match AGES.get(age_class) {
-            Some(age) => {
-                let days = if *age == 1 { "day" } else { "days" };
-                format!("used less than {age} {days} ago")
-            }
+            Some(age) => format!("used less than {} ago", counted(*age as usize, "day")),
             None => format!("not used for {} days", AGES[AGES.len() - 1]),
         });
     }
@@ -108,11 +106,11 @@ pub(crate) fn clear(folder: &Path) -> Result<String> {
             Err(e) => return Err(Error::file(&file.path, "remove", e)),
         }
     }
-    let (images, megabytes) = (sum.images, sum.bytes as f64 / 1e6);
-    let files = if images == 1 { "file" } else { "files" };
     Ok(format!(
-        "{}: {images} {files} removed ({megabytes:.1} MB)\n",
-        folder.display()
+        "{}: {} removed ({:.1} MB)\n",
+        folder.display(),
+        counted(sum.images, "file"),
+        sum.bytes as f64 / 1e6
     ))
 }
 

@@ -24,6 +24,7 @@ use crate::ask::requests::Request;
 use crate::ask::vendors::Vendor;
 use crate::ask::wire_kind::Wire;
 use crate::error::{Error, Result};
+use crate::types::text::counted;
 use crate::types::{FailureKind, LostAttempts, Reply};
 
 /// Maximum wait between retries if the server does not ask for one; chosen. A server may ask for longer waits.
@@ -482,11 +483,7 @@ fn out_of_paid_retries(mut failed: AskError, lost: LostAttempts) -> AskError {
     failed.failure.message = format!(
         "{} ({} charged without a reply, {} tokens; remedies: a larger --max-tokens, --thinking off, or more --retries paid)",
         failed.failure.message,
-        if lost.attempts == 1 {
-            "1 attempt".to_owned()
-        } else {
-            format!("{} attempts", lost.attempts)
-        },
+        counted(lost.attempts as usize, "attempt"),
         lost.usage.total().unwrap_or_default()
     );
     failed

@@ -4,6 +4,8 @@ use std::fmt::Write as _;
 
 use serde::{Deserialize, Serialize};
 
+use crate::types::text::counted;
+
 /// Counts of the ways in which image sizes were adapted to an enhancer, with their parameters. An image can be both padded and tiled.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SizeLog {
@@ -148,8 +150,7 @@ impl SizeLog {
             }
         })
         .collect();
-        let images = if self.images == 1 { "image" } else { "images" };
-        let mut text = format!("{} {images}", self.images);
+        let mut text = counted(self.images, "image");
         if !parts.is_empty() {
             // Writing to a string cannot fail.
             let _ = write!(text, ": {}", parts.join(", "));

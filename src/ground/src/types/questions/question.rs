@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::strict_group::StrictGroup;
 use crate::error::Error;
 use crate::types::images::FrameId;
+use crate::types::text::counted;
 
 /// The name of a question, unique in its data set.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -124,14 +125,9 @@ impl Choices {
     /// [`Error::Data`] at the place `choices`.
     pub fn with_truth(texts: Arc<[String]>, truth: Option<usize>) -> Result<Self, Error> {
         if !(2..=Self::MOST).contains(&texts.len()) {
-            let noun = if texts.len() == 1 {
-                "choice"
-            } else {
-                "choices"
-            };
             return choices_error(format!(
-                "{} {noun}: a question needs 2 to {}",
-                texts.len(),
+                "{}: a question needs 2 to {}",
+                counted(texts.len(), "choice"),
                 Self::MOST
             ));
         }
