@@ -114,7 +114,7 @@ impl Habitat {
         }
         if let Some(frame) = steps.keys().next() {
             tracing::warn!(
-                "{}: frames without an image in rgb: {}, for example {frame:?}; the name of a frame is that of its image without the extension",
+                "{}: frames without an image in rgb: {}, for example {frame:?}; a frame has the name of its image, without the extension",
                 trajectory.display(),
                 steps.len()
             );

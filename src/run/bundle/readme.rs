@@ -131,7 +131,7 @@ pub(super) fn command(manifest: &RunManifest, run: &AnyRun) -> String {
     if file.is_none() {
         words.extend(common_flags(&tested));
     }
-    // Without a models file, the judge's default address is that of the models.
+    // Without a models file, the judge uses the address of the models by default.
     if let Some(content) = judge.and_then(|judge| remote.get(&judge.to_owned()))
         && (file.is_some()
             || tested

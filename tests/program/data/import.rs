@@ -261,8 +261,8 @@ fn trajectory_must_fit_its_images() {
     );
     let message = scene.run("habitat", &[]).ended(0).stderr;
     insta::assert_snapshot!(redacted(&message), @r#"
-    WARN [TMP]/src/00800-x/trajectory.jsonl: frames without an image in rgb: 2, for example "000.png"; the name
-       of a frame is that of its image without the extension
+    WARN [TMP]/src/00800-x/trajectory.jsonl: frames without an image in rgb: 2, for example "000.png"; a frame
+       has the name of its image, without the extension
     "#);
     scene.text(trajectory, "{\"frame\":\"000\"}\n{\"frame\":\"000\"}\n");
     insta::assert_snapshot!(
