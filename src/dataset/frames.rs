@@ -28,7 +28,6 @@ use super::frame_facts::FrameFacts;
 use super::image_paths::{ImagePaths, is_image};
 use super::image_source::FrameFile;
 use super::maps::{DepthFile, MapPaths};
-use super::root::Location;
 use super::{Dataset, ImageSource, Root, SetArgs, SkipBad, ready_made, stem};
 use crate::error::{Error, Result};
 use crate::files::reading::{entries, json, json_lines};
@@ -163,8 +162,9 @@ impl FrameLine {
 
 /// Opens a folder of frames with the labels of its maps, without questions.
 pub(super) fn frames(folder: &Path, further: &[PathBuf], missing: MissingFiles) -> Result<Dataset> {
-    let info = data_set_info(folder)?;
-    let labels = labels(folder)?;
+    let root = Root::new(folder, further)?;
+    let info = data_set_info(&root)?;
+    let labels = labels(folder, further)?;
     let title = info.name.unwrap_or_default();
     let name = if title.is_empty() {
         stem(folder)
@@ -180,16 +180,15 @@ pub(super) fn frames(folder: &Path, further: &[PathBuf], missing: MissingFiles) 
 }
 
 /// Labels of the semantic maps of a folder; `None` without a `classes.json`.
-pub(super) fn labels(folder: &Path) -> Result<Option<Labels>> {
-    let classes = folder.join(CLASSES);
-    classes.exists().then(|| labels::read(&classes)).transpose()
+pub(super) fn labels(folder: &Path, further: &[PathBuf]) -> Result<Option<Labels>> {
+    let classes = Root::new(folder, further)?.own_file(CLASSES)?;
+    classes.map(|classes| labels::read(&classes)).transpose()
 }
 
-fn data_set_info(folder: &Path) -> Result<DataSetInfo> {
-    let path = folder.join(DATASET);
-    if !path.exists() {
+fn data_set_info(root: &Root) -> Result<DataSetInfo> {
+    let Some(path) = root.own_file(DATASET)? else {
         return Ok(DataSetInfo::default());
-    }
+    };
     let info: DataSetInfo = json(&path)?;
     if info.schema != SCHEMA {
         let problem = format_args!("schema {:?}; {SCHEMA:?} expected", info.schema);
@@ -199,8 +198,9 @@ fn data_set_info(folder: &Path) -> Result<DataSetInfo> {
 }
 
 /// Light in which the photographs of a folder were taken, from `dataset.json`; lit by default.
-pub(super) fn light(folder: &Path) -> Result<SetLight> {
-    Ok(data_set_info(folder)?.light.unwrap_or_default())
+pub(super) fn light(folder: &Path, further: &[PathBuf]) -> Result<SetLight> {
+    let info = data_set_info(&Root::new(folder, further)?)?;
+    Ok(info.light.unwrap_or_default())
 }
 
 /// Names of the segments of a scene by number; empty without a `segments.json`.
@@ -230,9 +230,13 @@ fn segment_names(root: &Root, scene: &str) -> Result<Arc<BTreeMap<u32, SegmentNa
 
 /// Opens a folder of frames with its questions; `questions` replaces its `questions.jsonl`.
 pub(super) fn open(folder: &Path, questions: Option<&Path>, set: &SetArgs) -> Result<Dataset> {
-    let file = questions.map_or_else(|| folder.join(QUESTIONS), Path::to_owned);
     let missing = MissingFiles::new(set.bad);
-    if questions.is_none() && !file.exists() {
+    let root = Root::new(folder, &set.root.data_root)?;
+    let file = match questions {
+        Some(named) => Some(named.to_owned()),
+        None => root.own_file(QUESTIONS)?,
+    };
+    let Some(file) = file else {
         if folder.join(FRAMES).exists() && folder.join(CLASSES).exists() {
             return frames(folder, &set.root.data_root, missing);
         }
@@ -246,7 +250,7 @@ pub(super) fn open(folder: &Path, questions: Option<&Path>, set: &SetArgs) -> Re
             "{what}no {QUESTIONS} or questions.csv in this folder, and no {FRAMES} with {CLASSES} to make questions of; --questions FILE names some, and --ask home asks about photographs without any"
         );
         return Err(Error::data(folder.display(), problem));
-    }
+    };
     if questions.is_none()
         && let Some(other) = other_question_files(folder).next()
     {
@@ -289,11 +293,10 @@ pub(super) fn sources(
     further: &[PathBuf],
     missing: MissingFiles,
 ) -> Result<BTreeMap<FrameId, ImageSource>> {
-    let list = folder.join(FRAMES);
-    if list.exists() {
-        listed_frames(&Root::new(folder, further)?, &list, missing)
-    } else {
-        images(&Root::new(folder, further)?)
+    let root = Root::new(folder, further)?;
+    match root.own_file(FRAMES)? {
+        Some(list) => listed_frames(&root, &list, missing),
+        None => images(&root),
     }
 }
 
@@ -310,7 +313,7 @@ fn listed_frames(
     list: &Path,
     missing: MissingFiles,
 ) -> Result<BTreeMap<FrameId, ImageSource>> {
-    let (info, mut names) = (data_set_info(root.folder())?, SegmentNames::new());
+    let (info, mut names) = (data_set_info(root)?, SegmentNames::new());
     let mut sources = BTreeMap::new();
     for (number, line) in json_lines::<FrameLine>(list)? {
         let id = FrameId(format!("{}/{}", line.scene, line.frame));
@@ -334,14 +337,8 @@ fn listed_frames(
 fn images(root: &Root) -> Result<BTreeMap<FrameId, ImageSource>> {
     let folder = root.folder();
     let mut sources = BTreeMap::new();
-    let (mut all, mut links_out) = (Vec::new(), Vec::new());
-    for path in entries(folder)? {
-        match root.locate(&path) {
-            Location::Inside => all.push(path),
-            Location::Outside => links_out.push(path),
-            Location::Missing => {}
-        }
-    }
+    let mut links_out = Vec::new();
+    let all = root.entries(folder, &mut links_out)?;
     root.warn_of_links_out(&links_out);
     let found = ImagePaths::from_paths(all.clone());
     for path in &found.images {
@@ -377,10 +374,10 @@ fn images(root: &Root) -> Result<BTreeMap<FrameId, ImageSource>> {
 /// Warns if a folder in this one has images: they are not read. Links out of the folder and hidden folders are left out.
 pub(super) fn warn_of_subfolders(folder: &Path, further: &[PathBuf]) -> Result<()> {
     let root = Root::new(folder, further)?;
-    let inner: Vec<PathBuf> = entries(folder)?
+    let inner: Vec<PathBuf> = root
+        .entries(folder, &mut Vec::new())?
         .into_iter()
-        .filter(|path| root.locate(path) == Location::Inside && !is_hidden(path))
-        .filter(|path| has_images(path))
+        .filter(|path| !is_hidden(path) && has_images(path))
         .collect();
     if let Some(first) = inner.first() {
         let count = match inner.len() {

@@ -6,9 +6,9 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use super::image_paths::ImagePaths;
-use super::{Dataset, ImageSource};
+use super::{Dataset, ImageSource, Root};
 use crate::error::{Error, Result};
-use crate::files::reading::{self, entries};
+use crate::files::reading;
 use crate::types::{Choices, Digest, Family, FrameId, Question, QuestionId};
 
 /// Opens a folder with one subfolder per class, and asks `question` about each image. Frames and questions are named `CLASS/FILE`.
@@ -18,12 +18,9 @@ use crate::types::{Choices, Digest, Family, FrameId, Question, QuestionId};
 ///
 /// # Errors
 /// If the folder has fewer than two classes, the number of choices is invalid ([`choice_count`]), or a file cannot be read.
-pub(super) fn open(
-    folder: &Path,
-    question: &str,
-    choices: Option<NonZeroUsize>,
-) -> Result<Dataset> {
-    let classes = classes(folder)?;
+pub(super) fn open(root: &Root, question: &str, choices: Option<NonZeroUsize>) -> Result<Dataset> {
+    let folder = root.folder();
+    let classes = classes(root)?;
     let names: Vec<&str> = classes.keys().map(String::as_str).collect();
     let count = choice_count(folder, names.len(), choices)?;
     tracing::warn!(
@@ -61,13 +58,16 @@ pub(super) fn open(
     Ok(Dataset::new(super::stem(folder), sources, questions))
 }
 
-/// Image files of each class, by class name. Warns about folders without images and about images in unsupported formats.
+/// Image files of each class, by class name. Warns about folders without images, images in unsupported formats, and links out of the data.
 ///
 /// # Errors
 /// If a folder cannot be read, or fewer than two have images.
-fn classes(folder: &Path) -> Result<BTreeMap<String, Vec<PathBuf>>> {
-    let mut classes = BTreeMap::new();
-    for inner in entries(folder)?.into_iter().filter(|path| path.is_dir()) {
+fn classes(root: &Root) -> Result<BTreeMap<String, Vec<PathBuf>>> {
+    let folder = root.folder();
+    let (mut classes, mut links_out) = (BTreeMap::new(), Vec::new());
+    let mut inside = root.entries(folder, &mut links_out)?;
+    inside.retain(|path| path.is_dir());
+    for inner in inside {
         let Some(name) = inner.file_name().and_then(OsStr::to_str) else {
             let problem = "the name of a class is not UTF-8; rename the folder";
             return Err(Error::data(inner.display(), problem));
@@ -75,7 +75,7 @@ fn classes(folder: &Path) -> Result<BTreeMap<String, Vec<PathBuf>>> {
         if name.starts_with('.') {
             continue;
         }
-        let found = ImagePaths::from_paths(entries(&inner)?);
+        let found = ImagePaths::from_paths(root.entries(&inner, &mut links_out)?);
         found.warn_of_unsupported(&inner);
         if found.images.is_empty() {
             tracing::warn!("{}: no images in it, so it is not a class", inner.display());
@@ -83,6 +83,7 @@ fn classes(folder: &Path) -> Result<BTreeMap<String, Vec<PathBuf>>> {
         }
         classes.insert(name.to_owned(), found.images);
     }
+    root.warn_of_links_out(&links_out);
     if classes.len() < 2 {
         let found = if classes.is_empty() {
             "no folder"
@@ -161,7 +162,9 @@ mod tests {
             std::fs::create_dir(&class).unwrap();
             std::fs::write(class.join("a.png"), "").unwrap();
         }
-        let problem = classes(folder.path()).unwrap_err().to_string();
+        let problem = classes(&Root::new(folder.path(), &[]).unwrap())
+            .unwrap_err()
+            .to_string();
         assert!(problem.contains("is not UTF-8; rename"), "{problem}");
     }
 
@@ -172,7 +175,9 @@ mod tests {
             std::fs::create_dir(folder.path().join(name)).unwrap();
             std::fs::write(folder.path().join(name).join("a.png"), "").unwrap();
         }
-        let problem = open(folder.path(), "Which?", None).unwrap_err().to_string();
+        let problem = open(&Root::new(folder.path(), &[]).unwrap(), "Which?", None)
+            .unwrap_err()
+            .to_string();
         assert!(
             problem.starts_with(&*folder.path().to_string_lossy()),
             "{problem}"

@@ -260,14 +260,14 @@ impl Dataset {
         frames::frames(folder, further, MissingFiles::Refuse)
     }
 
-    /// Labels of the semantic maps at a place; `None` without a `classes.json`.
+    /// Labels of the semantic maps at a place; `None` without a `classes.json`, which may also lie in the folders in `further`.
     ///
     /// # Errors
     /// If `classes.json` cannot be read; the error names the file.
-    pub fn labels_at(place: &DataPlace) -> Result<Option<Labels>> {
+    pub fn labels_at(place: &DataPlace, further: &[PathBuf]) -> Result<Option<Labels>> {
         match place {
             DataPlace::Rooms(_) => Ok(Some(rooms::labels())),
-            DataPlace::Path(path) if path.is_dir() => frames::labels(path),
+            DataPlace::Path(path) if path.is_dir() => frames::labels(path, further),
             DataPlace::Path(_) | DataPlace::Files(_) | DataPlace::Known { .. } => Ok(None),
         }
     }

@@ -7,8 +7,10 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use crate::error::{Error, Result};
-use crate::files::reading::{bytes, entries};
+use crate::files::reading::bytes;
 use crate::types::QuestionId;
+
+use super::Root;
 
 /// Open question about a walk through a building.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
@@ -66,16 +68,23 @@ pub(crate) fn read_questions(path: &Path) -> Result<Vec<OpenQuestion>> {
 /// Frames of a walk, sorted by name: the files in its folder that end in `-rgb.png`.
 ///
 /// # Errors
-/// If the folder is missing or has no such file.
-pub(crate) fn walk_frames(frames: &Path, episode: &str) -> Result<Vec<PathBuf>> {
-    let folder = frames.join(episode);
-    let mut paths = entries(&folder)?;
-    paths.retain(|path| path.to_string_lossy().ends_with("-rgb.png"));
+/// If the folder is missing or has no such file, or if the folder or a frame lies outside `root`.
+pub(crate) fn walk_frames(root: &Root, episode: &str) -> Result<Vec<PathBuf>> {
+    let folder = root
+        .path(root.folder(), Path::new(episode))
+        .map_err(|problem| Error::data("episode_history", problem))?;
+    let mut links_out = Vec::new();
+    let is_frame = |path: &PathBuf| path.to_string_lossy().ends_with("-rgb.png");
+    let mut paths = root.entries(&folder, &mut links_out)?;
+    paths.retain(is_frame);
+    // Without it, others would be sampled.
+    if let Some(link) = links_out.into_iter().find(is_frame) {
+        return Err(root.link_out_error(&link));
+    }
     if paths.is_empty() {
         let problem = "no frame in it: files that end in -rgb.png expected";
         return Err(Error::data(folder.display(), problem));
     }
-    paths.sort();
     Ok(paths)
 }
 
@@ -156,8 +165,9 @@ mod tests {
         let base = tempfile::tempdir().unwrap();
         let folder = base.path().join("hm3d-v0/000-x");
         fs::create_dir_all(&folder).unwrap();
+        let root = Root::new(base.path(), &[]).unwrap();
         assert!(
-            walk_frames(base.path(), "hm3d-v0/000-x")
+            walk_frames(&root, "hm3d-v0/000-x")
                 .unwrap_err()
                 .to_string()
                 .contains("-rgb.png")
@@ -170,8 +180,8 @@ mod tests {
         ] {
             fs::write(folder.join(name), "").unwrap();
         }
-        let names: Vec<_> = walk_frames(base.path(), "hm3d-v0/000-x").unwrap();
+        let names: Vec<_> = walk_frames(&root, "hm3d-v0/000-x").unwrap();
         assert!(names[0].ends_with("00002-rgb.png") && names.len() == 2);
-        assert!(walk_frames(base.path(), "nowhere").is_err());
+        assert!(walk_frames(&root, "nowhere").is_err());
     }
 }

@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use super::Root;
 use super::image_paths::ImagePaths;
 use crate::error::{Error, Result};
-use crate::files::reading::entries;
 
 /// Names of the normal-light and the low-light folder: plain words, and the names in the LOL and LISU data sets.
 const FOLDERS: [[&str; 2]; 3] = [
@@ -49,13 +49,16 @@ impl Pairs {
     ///
     /// # Errors
     /// If no pair is found, or two images of the same side have the same name.
-    pub(crate) fn open(folder: &Path) -> Result<Self> {
-        let entries = entries(folder)?;
+    pub(crate) fn open(folder: &Path, further: &[PathBuf]) -> Result<Self> {
+        let root = Root::new(folder, further)?;
+        let mut links_out = Vec::new();
+        let entries = root.entries(folder, &mut links_out)?;
+        root.warn_of_links_out(&links_out);
         for [normal, low] in FOLDERS {
             if let (Some(normal), Some(low)) =
                 (subfolder(&entries, normal), subfolder(&entries, low))
             {
-                return Self::from_folders(normal, low);
+                return Self::from_folders(normal, low, further);
             }
         }
         let mut sides = [BTreeMap::new(), BTreeMap::new()];
@@ -77,10 +80,14 @@ impl Pairs {
     ///
     /// # Errors
     /// If no pair is found, or two images of the same folder have the same name.
-    pub(crate) fn from_folders(normal: &Path, low: &Path) -> Result<Self> {
+    pub(crate) fn from_folders(normal: &Path, low: &Path, further: &[PathBuf]) -> Result<Self> {
         let mut sides = [BTreeMap::new(), BTreeMap::new()];
         for (side, folder) in sides.iter_mut().zip([normal, low]) {
-            for path in images(entries(folder)?, folder) {
+            let root = Root::new(folder, further)?;
+            let mut links_out = Vec::new();
+            let entries = root.entries(folder, &mut links_out)?;
+            root.warn_of_links_out(&links_out);
+            for path in images(entries, folder) {
                 let (name, _) = split_side(&stem(&path));
                 add_image(side, name, &path)?;
             }
@@ -230,7 +237,7 @@ mod tests {
             &["normal1.png", "low1_low.png"],
         ] {
             let folder = folder(files);
-            let pairs = Pairs::open(folder.path()).unwrap();
+            let pairs = Pairs::open(folder.path(), &[]).unwrap();
             assert_eq!(names(&pairs), ["1"], "{files:?}");
             assert!(pairs.unmatched.is_empty(), "{files:?}");
         }
@@ -241,7 +248,7 @@ mod tests {
         let others = ["YELLOW.png", "highway.png", "way.png", "yellow.png"];
         let files = [&["normal1.png", "low1.png"][..], &others].concat();
         let folder = folder(&files);
-        let pairs = Pairs::open(folder.path()).unwrap();
+        let pairs = Pairs::open(folder.path(), &[]).unwrap();
         let unmatched: Vec<String> = pairs.unmatched.iter().map(|path| file_name(path)).collect();
         assert_eq!(
             (names(&pairs), unmatched),
@@ -258,7 +265,7 @@ mod tests {
             "high3.png",
             "x.png",
         ]);
-        let pairs = Pairs::open(folder.path()).unwrap();
+        let pairs = Pairs::open(folder.path(), &[]).unwrap();
         let unmatched: Vec<String> = pairs.unmatched.iter().map(|path| file_name(path)).collect();
         assert_eq!(unmatched, ["high3.png", "low1_edited.png", "x.png"]);
     }
@@ -266,12 +273,12 @@ mod tests {
     #[test]
     fn missing_pairs_and_duplicate_names_are_errors() {
         let none = folder(&["a.png", "low/1.png"]);
-        let error = Pairs::open(none.path()).unwrap_err().to_string();
+        let error = Pairs::open(none.path(), &[]).unwrap_err().to_string();
         assert!(error.contains("--normal DIR"), "{error}");
         let two = folder(&["normal1.png", "low1.png", "low1.jpg"]);
-        let error = Pairs::open(two.path()).unwrap_err().to_string();
+        let error = Pairs::open(two.path(), &[]).unwrap_err().to_string();
         assert!(error.contains("same name"), "{error}");
         let apart = folder(&["normal/1.png", "low/2.png"]);
-        assert!(Pairs::open(apart.path()).is_err());
+        assert!(Pairs::open(apart.path(), &[]).is_err());
     }
 }

@@ -5,10 +5,8 @@ use std::path::{Path, PathBuf};
 
 use super::frames::MissingFiles;
 use super::image_paths::{ImagePaths, is_image};
-use super::root::{Location, Root};
-use super::{DataPlace, Dataset, SetArgs, frames, stem};
+use super::{DataPlace, Dataset, Root, SetArgs, frames, stem};
 use crate::error::{Error, Result};
-use crate::files::reading::entries;
 use crate::picture::image_file::format::SUPPORTED_FORMATS;
 use crate::types::text::counted;
 
@@ -125,16 +123,15 @@ impl Scan {
         if !self.seen.insert(real) {
             return Ok(());
         }
-        for path in entries(folder)? {
+        for path in root.entries(folder, &mut self.links_out)? {
             let name = path.file_name().unwrap_or_default().to_string_lossy();
             if name.starts_with('.') {
                 continue;
             }
-            match root.locate(&path) {
-                Location::Inside if path.is_dir() => self.add_folder(root, &path)?,
-                Location::Inside => self.files.push(path),
-                Location::Outside => self.links_out.push(path),
-                Location::Missing => {}
+            if path.is_dir() {
+                self.add_folder(root, &path)?;
+            } else {
+                self.files.push(path);
             }
         }
         Ok(())

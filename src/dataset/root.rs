@@ -3,12 +3,14 @@
 //! A downloaded data set must not be able to send private files of the user to an endpoint. Every path in the data is therefore
 //! resolved here, following links, and must be below the folder of the data or a folder given with `--data-root`.
 
+use std::fs;
 use std::path::{self, Component, Path, PathBuf};
 
 use clap::Args;
 
 use super::similar_path::SimilarPaths;
 use crate::error::{Error, Result};
+use crate::files::reading;
 use crate::types::{Decides, FrameId, shell_word};
 
 /// Flag for further folders with files of the data.
@@ -158,6 +160,61 @@ impl Root {
         }
     }
 
+    /// Path of a file of the data set itself, such as `questions.jsonl`; `None` if the folder has none.
+    ///
+    /// # Errors
+    /// If the file is a link out of the folders.
+    pub(crate) fn own_file(&self, name: impl AsRef<Path>) -> Result<Option<PathBuf>> {
+        let path = self.folder.join(name);
+        match self.locate(&path) {
+            Location::Inside => Ok(Some(path)),
+            Location::Missing => Ok(None),
+            Location::Outside => Err(self.link_out_error(&path)),
+        }
+    }
+
+    /// Paths in a folder of the data, sorted by name. Links out of the folders are added to `links_out` instead; links to nothing are left
+    /// out.
+    ///
+    /// # Errors
+    /// If the folder cannot be read.
+    pub(crate) fn entries(
+        &self,
+        folder: &Path,
+        links_out: &mut Vec<PathBuf>,
+    ) -> Result<Vec<PathBuf>> {
+        let mut inside = Vec::new();
+        for path in reading::entries(folder)? {
+            match self.locate(&path) {
+                Location::Inside => inside.push(path),
+                Location::Outside => links_out.push(path),
+                Location::Missing => {}
+            }
+        }
+        Ok(inside)
+    }
+
+    /// Checks that no link in the folder or its subfolders leads out of the folders.
+    ///
+    /// # Errors
+    /// If one does, or if a folder cannot be read.
+    pub(crate) fn refuse_links_out(&self) -> Result<()> {
+        let mut waiting = vec![self.folder.clone()];
+        while let Some(folder) = waiting.pop() {
+            let error = |e| Error::file(&folder, "read", e);
+            for entry in fs::read_dir(&folder).map_err(error)? {
+                let entry = entry.map_err(error)?;
+                let kind = entry.file_type().map_err(error)?;
+                if kind.is_dir() {
+                    waiting.push(entry.path());
+                } else if kind.is_symlink() && self.locate(&entry.path()) == Location::Outside {
+                    return Err(self.link_out_error(&entry.path()));
+                }
+            }
+        }
+        Ok(())
+    }
+
     /// Location of a path, following links.
     pub(crate) fn locate(&self, path: &Path) -> Location {
         match path.canonicalize() {
@@ -183,13 +240,22 @@ impl Root {
             1 => "1 link leads out of the folder and is not followed".to_owned(),
             n => format!("{n} links lead out of the folder and are not followed"),
         };
-        let real = first.canonicalize().unwrap_or_else(|_| first.clone());
         tracing::warn!(
-            "{}: {count}: {}; --data-root {} allows the folder that it leads to",
+            "{}: {count}: {}; {}",
             self.folder.display(),
             first.strip_prefix(&self.folder).unwrap_or(first).display(),
-            real.parent().unwrap_or(&real).display()
+            allowing_flag(first)
         );
+    }
+
+    /// Error for a link out of the folders.
+    pub(crate) fn link_out_error(&self, link: &Path) -> Error {
+        let problem = format_args!(
+            "leads out of {}, the folder of the data; {}",
+            self.folder.display(),
+            allowing_flag(link)
+        );
+        Error::data(link.display(), problem)
     }
 
     /// Error for a path in the data that leads to `target` outside the folders.
@@ -203,6 +269,19 @@ impl Root {
             shell_word(&parent.display().to_string())
         )
     }
+}
+
+/// Remedy for a link out of the folders: the flag that allows its target. The target of a link to a folder is that folder.
+fn allowing_flag(link: &Path) -> String {
+    let real = link.canonicalize().unwrap_or_else(|_| link.to_owned());
+    let folder = match real.parent() {
+        Some(parent) if !real.is_dir() => parent,
+        _ => &real,
+    };
+    format!(
+        "--data-root {} allows the folder that it leads to",
+        shell_word(&folder.display().to_string())
+    )
 }
 
 /// Checks that a name in the data is a path: not empty, not a URL, not a device.
@@ -258,8 +337,6 @@ fn with_slashes(path: &Path) -> String {
 
 #[cfg(test)]
 mod tests {
-    use std::fs;
-
     use super::*;
 
     /// A folder with the data set `set`, which has an image `fr/a.png`, and `secret.png` outside it.

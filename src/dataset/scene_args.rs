@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::pairs::Pairs;
-use super::{DataPlace, Dataset, SetArgs, frames, label_folders, pair_frames, ready_made};
+use super::{DataPlace, Dataset, Root, SetArgs, frames, label_folders, pair_frames, ready_made};
 use crate::error::{Error, Result};
 use crate::types::{Decides, SetLight};
 
@@ -71,10 +71,10 @@ impl PairFolders {
     ///
     /// # Errors
     /// If no pair is found.
-    fn open(&self) -> Result<Pairs> {
+    fn open(&self, further: &[PathBuf]) -> Result<Pairs> {
         match self {
-            Self::Two(normal, low) => Pairs::from_folders(normal, low),
-            Self::One(folder) => Pairs::open(folder),
+            Self::Two(normal, low) => Pairs::from_folders(normal, low, further),
+            Self::One(folder) => Pairs::open(folder, further),
         }
     }
 }
@@ -92,10 +92,10 @@ impl SceneArgs {
     ///
     /// # Errors
     /// If `dataset.json` cannot be read.
-    pub(crate) fn set_light(&self, place: &DataPlace) -> Result<SetLight> {
+    pub(crate) fn set_light(&self, place: &DataPlace, further: &[PathBuf]) -> Result<SetLight> {
         match (self.light, place) {
             (Some(light), _) => Ok(light),
-            (None, DataPlace::Path(path)) if path.is_dir() => frames::light(path),
+            (None, DataPlace::Path(path)) if path.is_dir() => frames::light(path, further),
             (None, _) => Ok(SetLight::Lit),
         }
     }
@@ -110,7 +110,7 @@ impl SceneArgs {
         questions: Option<&Path>,
         set: &SetArgs,
     ) -> Result<Dataset> {
-        match self.pairs_or_classes(place)? {
+        match self.pairs_or_classes(place, &set.root.data_root)? {
             None => Dataset::open(place, questions, set),
             Some(dataset) if self.pairs.is_some() => {
                 let Some(file) = questions else {
@@ -132,9 +132,13 @@ impl SceneArgs {
     ///
     /// # Errors
     /// If the data cannot be read; the error names the file.
-    pub(crate) fn pairs_or_classes(&self, place: &DataPlace) -> Result<Option<Dataset>> {
+    pub(crate) fn pairs_or_classes(
+        &self,
+        place: &DataPlace,
+        further: &[PathBuf],
+    ) -> Result<Option<Dataset>> {
         if let Some(pairs) = &self.pairs {
-            return pair_frames::open(pairs.folder(), pairs.open()?).map(Some);
+            return pair_frames::open(pairs.folder(), pairs.open(further)?).map(Some);
         }
         let Some(question) = &self.label_folders else {
             return Ok(None);
@@ -143,7 +147,8 @@ impl SceneArgs {
             let problem = "--data must name the folder with a folder for each class";
             return Err(Error::usage("--label-folders", problem));
         };
-        label_folders::open(folder, question, self.choices).map(Some)
+        let root = Root::new(folder, further)?;
+        label_folders::open(&root, question, self.choices).map(Some)
     }
 }
 

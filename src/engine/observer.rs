@@ -1,5 +1,6 @@
 //! The observer and its controls as built-in models: [`Observer`].
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::ask::{Call, Local, LocalAnswer, Random};
@@ -40,10 +41,11 @@ impl Observer {
     pub(crate) fn open(
         dataset: &Arc<Dataset>,
         place: &DataPlace,
+        further: &[PathBuf],
         questions: &[Question],
         rules: Rules,
     ) -> Result<Arc<Self>> {
-        let labels = Dataset::labels_at(place)?.ok_or_else(|| {
+        let labels = Dataset::labels_at(place, further)?.ok_or_else(|| {
             unusable(&format!(
                 "{} has no maps: frames with segments or classes (frames.jsonl, classes.json) are needed",
                 dataset.name()

@@ -28,6 +28,7 @@ mod unread_files;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
+use crate::dataset::Root;
 use crate::error::{Error, Result};
 use crate::types::flags::flag_words;
 
@@ -100,7 +101,8 @@ pub(crate) fn unread_files(folders: &[PathBuf], adapter: &dyn Adapter) -> Result
 /// Opens a data set.
 ///
 /// # Errors
-/// If a file or folder is missing or has another layout, or a required flag is missing; the error names it.
+/// If a file or folder is missing or has another layout, a link leads out of the folder, or a required flag is missing; the error names
+/// it.
 fn open(
     kind: DataSetKind,
     folder: &Path,
@@ -113,6 +115,7 @@ fn open(
             format_args!("{}: no such folder", folder.display()),
         ));
     }
+    Root::new(folder, further)?.refuse_links_out()?;
     let adapter: Box<dyn Adapter> = match kind {
         DataSetKind::Habitat => Box::new(habitat::Habitat::open(folder, args)?),
         DataSetKind::Scannet => Box::new(scannet::Scannet::open(folder, args)?),

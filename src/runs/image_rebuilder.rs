@@ -93,12 +93,15 @@ impl ImageRebuilder {
         let recipe = recipe.with_enhanced_images(elsewhere)?;
         let (data, recipe) = if let Some(walk) = flags.walk {
             let recipe = recipe.for_walks(&walk);
-            let folder = WalkFolder::new(&walk, flags.decode.rule());
+            let folder = WalkFolder::new(&walk, &flags.data.set.root, flags.decode.rule());
             (FrameData::Walks(folder, walk), recipe)
         } else {
             let dataset = if manifest.identity.contains_key(ASK) {
                 Photographs::open(&flags.data.place(), &flags.data.set)?.dataset
-            } else if let Some(dataset) = flags.scene.pairs_or_classes(&flags.data.place())? {
+            } else if let Some(dataset) = flags
+                .scene
+                .pairs_or_classes(&flags.data.place(), &flags.data.set.root.data_root)?
+            {
                 dataset
             } else {
                 frames(&flags.data)?

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::columns::map::ColumnMap;
 use super::container::Archive;
+use crate::dataset::root::Root;
 use crate::error::{Error, Result};
 use crate::files::reading;
 
@@ -20,11 +21,13 @@ impl FolderInfo {
     const FILE: &str = "dataset.json";
 
     /// Reads `dataset.json` in a folder; the default if it does not exist.
-    pub(super) fn in_folder(folder: &Path) -> Result<Self> {
-        let path = folder.join(Self::FILE);
-        if !path.is_file() {
+    ///
+    /// # Errors
+    /// If the file cannot be read, or is a link out of the folders of `root`.
+    pub(super) fn in_folder(root: &Root) -> Result<Self> {
+        let Some(path) = root.own_file(Self::FILE)? else {
             return Ok(Self::default());
-        }
+        };
         Self::read(&path, &reading::json(&path)?)
     }
 

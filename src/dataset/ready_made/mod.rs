@@ -70,13 +70,13 @@ pub(super) fn open(places: &[PathBuf], stem: &str, args: &SetArgs) -> Result<Rea
         mut notes,
         joined,
     } = container::find_files(places, args)?;
-    let info = match &archive {
-        Some(archive) => FolderInfo::in_archive(archive)?,
-        None => FolderInfo::in_folder(&folder)?,
-    };
     let mut allowed_roots = args.root.data_root.clone();
     allowed_roots.extend(further);
     let root = Root::new(&folder, &allowed_roots)?;
+    let info = match &archive {
+        Some(archive) => FolderInfo::in_archive(archive)?,
+        None => FolderInfo::in_folder(&root)?,
+    };
     let files: Vec<Arc<SetFile>> = files.into_iter().map(Arc::new).collect();
     let place = match &*files {
         [file] => file.label.path.as_path(),
@@ -231,12 +231,12 @@ pub(super) fn questions_about_frames(file: &Path, args: &SetArgs) -> Result<File
     SetFile::open(file.to_owned(), String::new())?.read(args.rows.as_deref(), &mut table)?;
     let frame = frame_map(&table);
     let folder = file.parent().unwrap_or(Path::new(""));
-    let info = FolderInfo::in_folder(folder)?;
+    let root = Root::new(folder, &args.root.data_root)?;
+    let info = FolderInfo::in_folder(&root)?;
     table.parse_cells(info.map.iter().chain(&args.map));
     let map = ColumnMap::merge(frame.iter().chain(&info.map).chain(&args.map));
     let (roles, set) = parse_rows(&table, &map, args, None, ImageForm::Frames)
         .map_err(|problem| Error::data(file.display(), problem))?;
-    let root = Root::new(folder, &[])?;
     let frames = Frames::new(
         &table,
         &root,

@@ -10,6 +10,7 @@ use serde::Serialize;
 
 use crate::dataset::Picture;
 use crate::dataset::openeqa::{sample_indices, walk_frames};
+use crate::dataset::{Root, RootArgs};
 use crate::error::Result;
 use crate::images::frames::source::{Frames, Source, SourceFrame};
 use crate::images::progress::Progress;
@@ -74,6 +75,8 @@ fn longer_side(text: &str) -> Result<Scaling, String> {
 #[derive(Debug)]
 pub(crate) struct WalkFolder {
     folder: PathBuf,
+    /// Further folders that the walks may lie in.
+    further: Vec<PathBuf>,
     rule: DecodeRule,
 }
 
@@ -90,9 +93,10 @@ impl Frames for WalkFolder {
 }
 
 impl WalkFolder {
-    pub(crate) fn new(walk: &WalkArgs, rule: DecodeRule) -> Self {
+    pub(crate) fn new(walk: &WalkArgs, root: &RootArgs, rule: DecodeRule) -> Self {
         Self {
             folder: walk.folder.clone(),
+            further: root.data_root.clone(),
             rule,
         }
     }
@@ -122,9 +126,10 @@ impl WalkFolder {
     /// Reads the sampled frames of a walk.
     ///
     /// # Errors
-    /// If the folder of the walk is missing or has no frame, or if a sampled frame is broken.
+    /// If the folder of the walk is missing, has no frame or lies outside the folder of walks, or if a sampled frame is broken.
     pub(crate) fn source(&self, name: &str, settings: &WalkArgs) -> Result<Source> {
-        let paths = walk_frames(&self.folder, name)?;
+        let root = Root::new(&self.folder, &self.further)?;
+        let paths = walk_frames(&root, name)?;
         let sample = sample_indices(paths.len(), settings.frames.get());
         // A frame that is sampled twice is read once: `order` refers to it by its position.
         let mut positions = BTreeMap::new();

@@ -126,7 +126,9 @@ impl EvaluateArgs {
         }
         let prompts = self.choice.prompts.as_deref();
         let place = self.scene.place(self.data.place());
-        let set_light = self.scene.set_light(&place)?;
+        let set_light = self
+            .scene
+            .set_light(&place, &self.data.set.root.data_root)?;
         let experiment = ExperimentSettings {
             data: place.path().map(Path::to_owned),
             set_light,

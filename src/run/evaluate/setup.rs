@@ -333,7 +333,13 @@ fn open_models(
         .any(|model| matches!(model.id, ModelName::Observer(_)));
     let observer = if asks_observer {
         let rules = config.rules.clone();
-        Some(Observer::open(dataset, &config.place, questions, rules)?)
+        Some(Observer::open(
+            dataset,
+            &config.place,
+            &config.set.root.data_root,
+            questions,
+            rules,
+        )?)
     } else {
         None
     };

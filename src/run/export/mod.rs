@@ -83,7 +83,7 @@ pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> 
         let problem = "export takes pairs from a folder whose frames.jsonl names the photographs in the dark (\"dark\")";
         return Err(Error::usage("--pairs", problem));
     }
-    let set = args.scene.set_light(&args.data)?;
+    let set = args.scene.set_light(&args.data, &args.set.root.data_root)?;
     let light = LightSettings::resolve(&args.light, set)?;
     let enhancement = args.enhancers.clone().for_set(set);
     check_used(&light, &enhancement)?;

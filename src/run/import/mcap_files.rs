@@ -4,6 +4,7 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use super::frame_writer::COPIED;
+use crate::dataset::Root;
 use crate::error::{Error, Result};
 use crate::files::reading::{entries, open};
 use crate::images::progress::Progress;
@@ -19,8 +20,14 @@ pub(super) fn files(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
             files.push(path.clone());
             continue;
         }
-        let mut inside = entries(path)?;
-        inside.retain(|file| file.extension().is_some_and(|ending| ending == "mcap"));
+        let is_mcap = |file: &PathBuf| file.extension().is_some_and(|ending| ending == "mcap");
+        let mut links_out = Vec::new();
+        let mut inside = Root::new(path, &[])?.entries(path, &mut links_out)?;
+        if let Some(link) = links_out.into_iter().find(is_mcap) {
+            let problem = "this link leads out of the folder of the recording; name the file itself to read it";
+            return Err(Error::data(link.display(), problem));
+        }
+        inside.retain(is_mcap);
         if inside.is_empty() {
             return Err(Error::data(path.display(), no_mcap_problem(path)?));
         }

@@ -7,7 +7,7 @@ use clap::{Arg, Args};
 
 use super::judge::{Judge, JudgeArgs};
 use super::questions::OpenSelectionArgs;
-use crate::dataset::DecodeArgs;
+use crate::dataset::{DecodeArgs, RootArgs};
 use crate::engine::batch::{BatchFileArgs, BatchRunArgs};
 use crate::engine::models::ModelName;
 use crate::engine::settings::{ExperimentSettings, JobArgs, JobSettings};
@@ -29,6 +29,9 @@ pub(crate) struct OpenEqaArgs {
     /// The flags for showing walks.
     #[command(flatten)]
     pub walk: WalkArgs,
+    /// Further folders that walks may lie in.
+    #[command(flatten)]
+    pub root: RootArgs,
     /// The reading of images.
     #[command(flatten)]
     pub decode: DecodeArgs,
@@ -88,6 +91,8 @@ pub(super) struct OpenEqa {
     pub(super) questions: PathBuf,
     pub(super) chosen: OpenSelectionArgs,
     pub(super) walk: WalkArgs,
+    /// Further folders that the walks may lie in.
+    pub(super) root: RootArgs,
     /// Rule for decoding images.
     pub(super) rule: DecodeRule,
     pub(super) answers: Vec<AnswersFile>,
@@ -179,6 +184,7 @@ impl OpenEqaArgs {
             questions: self.questions,
             chosen: self.chosen,
             walk: self.walk,
+            root: self.root,
             rule: self.decode.rule(),
             answers: self.answers,
             judge,

@@ -85,7 +85,7 @@ impl<'a> OpenSetup<'a> {
         } else {
             recipe
         };
-        let walks = WalkFolder::new(&config.walk, config.rule);
+        let walks = WalkFolder::new(&config.walk, &config.root, config.rule);
         let names = walk_names(&questions);
         let (sources, conditions) = if shows_frames {
             let sources = walks.inspect(&names, &config.walk, progress);

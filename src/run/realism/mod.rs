@@ -34,10 +34,13 @@ use darkqa_score::photographs::realism::gain::ProfileFit;
 /// If there is no pair, none can be compared, most are swapped, or a file cannot be written.
 pub(crate) fn realism(args: &RealismArgs, progress: &Progress) -> Result<Outcome> {
     let (found, place) = match (&args.pairs, &args.normal, &args.low) {
-        (None, Some(normal), Some(low)) => (Pairs::from_folders(normal, low)?, low.as_path()),
+        (None, Some(normal), Some(low)) => (
+            Pairs::from_folders(normal, low, &args.root.data_root)?,
+            low.as_path(),
+        ),
         (folder, ..) => {
             let folder = folder.as_deref().unwrap_or(Path::new("."));
-            (Pairs::open(folder)?, folder)
+            (Pairs::open(folder, &args.root.data_root)?, folder)
         }
     };
     let sensor = SensorSettings::resolve(&args.sensor)?;

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::dataset::DecodeArgs;
+use crate::dataset::{DecodeArgs, RootArgs};
 use crate::images::workers::ThreadArgs;
 use crate::types::Decides;
 use darkqa_light::SensorArgs;
@@ -29,6 +29,9 @@ pub(crate) struct RealismArgs {
     /// The images in low light, of the same names; default: in PAIRS
     #[arg(long, value_name = "DIR", requires = "normal", add = Decides::Pixels)]
     pub low: Option<PathBuf>,
+    /// Further folders that images may lie in.
+    #[command(flatten)]
+    pub root: RootArgs,
     /// The exposure drop of every pair in EV, -20 to 20; default: estimated for each from its mean light
     #[arg(long, value_name = "EV", allow_negative_numbers = true, value_parser = drop_ev, add = Decides::Pixels)]
     pub ev: Option<f32>,

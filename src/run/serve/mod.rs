@@ -89,8 +89,14 @@ pub(crate) fn serve(args: &ServeArgs, progress: &Progress) -> Result<Outcome> {
         &args.root.data_root,
     )?);
     let prior = Random { seed: args.seed };
-    let observer = Observer::open(&dataset, &args.data, &[], Rules::built_in()?)
-        .map_err(|e| e.usage_at("--data"))?;
+    let observer = Observer::open(
+        &dataset,
+        &args.data,
+        &args.root.data_root,
+        &[],
+        Rules::built_in()?,
+    )
+    .map_err(|e| e.usage_at("--data"))?;
     let models = [
         ("darkqa-observer", Model::Local(observer.model(None, prior))),
         ("darkqa-random", Model::Random(prior)),

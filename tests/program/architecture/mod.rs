@@ -97,6 +97,34 @@ const CIRCLES: [(&[&str], &str); 4] = [
     ),
 ];
 
+/// Folders with the code that reads the data sets of strangers, which may hold links to any file.
+const DATA_READERS: [&str; 4] = ["dataset", "import", "images/frames", "run/openeqa"];
+
+/// The places among them that list folders or open files without `dataset::Root`, each with its reason.
+const LISTING_PLACES: [(&str, &str); 6] = [
+    ("dataset/root.rs", "it checks them"),
+    (
+        "dataset/frames.rs",
+        "whether a folder is empty, or has an image, of folders that Root let pass",
+    ),
+    (
+        "dataset/similar_path.rs",
+        "names for messages, which Root checks",
+    ),
+    (
+        "dataset/ready_made/container/tree.rs",
+        "asks Root about each link",
+    ),
+    (
+        "dataset/ready_made/container/find.rs",
+        "asks Root about each file",
+    ),
+    (
+        "import",
+        "folders that passed Root::refuse_links_out, or files that the user names",
+    ),
+];
+
 /// The functions that make a digest, and use debug output in what they tell the user alone.
 const DEBUG_IN_MESSAGES: [(&str, &str); 3] = [
     ("run/questions/mod.rs", "measure_frame"),
@@ -162,6 +190,13 @@ fn libraries_stand_in_their_places() {
         .iter()
         .flat_map(|(name, places)| rules::library(&FILES, name, places));
     assert_none(&found.collect::<Vec<_>>());
+}
+
+/// A file that a stranger's data set names, or a link in it, must not lead to a private file of the user.
+#[test]
+fn data_are_listed_in_their_places() {
+    let places: Vec<&str> = LISTING_PLACES.iter().map(|(place, _)| *place).collect();
+    assert_none(&rules::listings(&FILES, &DATA_READERS, &places));
 }
 
 #[test]

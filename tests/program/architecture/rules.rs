@@ -71,6 +71,39 @@ pub(crate) fn library(files: &Files, name: &str, places: &[&str]) -> Vec<String>
     misplaced(&uses.collect::<Vec<_>>(), &format!("`{name}`"), places)
 }
 
+/// Where folders are listed or files are opened by the standard library in `readers`, outside of some places, and the places that do
+/// neither; tests are free.
+pub(crate) fn listings(files: &Files, readers: &[&str], places: &[&str]) -> Vec<String> {
+    const WAYS: [[&str; 2]; 6] = [
+        ["reading", "entries"],
+        ["fs", "read"],
+        ["fs", "read_dir"],
+        ["fs", "read_to_string"],
+        ["File", "open"],
+        ["glob", "glob"],
+    ];
+    let uses = files.parts_outside_tests().filter(|(source, part)| {
+        let is_reader = readers.iter().any(|reader| {
+            let rest = source.path.strip_prefix(reader);
+            rest.is_some_and(|rest| rest.starts_with('/'))
+        });
+        let end: Vec<&str> = part
+            .names
+            .iter()
+            .rev()
+            .take(2)
+            .rev()
+            .map(String::as_str)
+            .collect();
+        is_reader && part.is_path() && WAYS.iter().any(|way| way[..] == end)
+    });
+    misplaced(
+        &uses.collect::<Vec<_>>(),
+        "a list of a folder or an open file",
+        places,
+    )
+}
+
 /// Where a future is awaited outside of some places, and the places that await none; tests are free.
 pub(crate) fn awaits(files: &Files, places: &[&str]) -> Vec<String> {
     let parts = files.parts_outside_tests();

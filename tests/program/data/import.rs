@@ -215,6 +215,21 @@ fn habitat_renders_of_matterport_and_replica() {
     });
 }
 
+#[cfg(unix)]
+#[test]
+fn links_out_of_the_data_set_are_refused() {
+    let scene = habitat();
+    let secret = scene.0.path().join("secret.png");
+    fs::rename(scene.at("00800-x/rgb/000.png"), &secret).unwrap();
+    std::os::unix::fs::symlink(&secret, scene.at("00800-x/rgb/000.png")).unwrap();
+    insta::assert_snapshot!(redacted(&scene.refused("habitat", &[])), @"
+    error: [TMP]/src/00800-x/rgb/000.png: leads out of [TMP]/src, the folder of the data; --data-root [TMP] allows
+        the folder that it leads to
+    ");
+    let folder = scene.0.path().display().to_string();
+    scene.import("habitat", &["--data-root", &folder]);
+}
+
 #[test]
 fn faulty_render_labels_are_named() {
     let scene = habitat();

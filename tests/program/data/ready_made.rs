@@ -5,7 +5,7 @@ use std::fs;
 use serde_json::{Value, json};
 
 use crate::support::run::{Bench, words};
-use crate::support::snapshot::{lines_with, redacted};
+use crate::support::snapshot::{each, lines_with, redacted};
 
 /// A folder with `set.json`: two questions whose answers are numbers from 0 or from 1, and one that is open.
 fn bench() -> Bench {
@@ -131,6 +131,123 @@ fn outside_links_are_named_and_skipped() {
         "{called:?}"
     );
     assert!(bench.path("dark/b_L5-ev.png").exists());
+}
+
+/// Each kind of file that a data set may replace by a link, in a folder of its own, and the call that reads it.
+#[cfg(unix)]
+#[test]
+fn links_out_of_data_are_not_read() {
+    use std::os::unix::fs::symlink;
+
+    let bench = bench();
+    fs::create_dir(bench.path("private")).unwrap();
+    let make = |path: &str| {
+        let path = bench.path(path);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        path
+    };
+    let secret = make("private/secret.png");
+    image::RgbImage::new(9, 7).save(&secret).unwrap();
+    let question = |image: &str, key: &str| {
+        json!({"id": 1, key: image, "question": "?", "choices": ["x", "y"], "answer": "x"})
+            .to_string()
+    };
+    let frame = json!({"scene": "s", "frame": "0", "rgb": "a.png"}).to_string();
+    bench.file("private/questions.jsonl", question("a.png", "image"));
+    bench.file("private/frames.jsonl", &frame);
+    bench.file("private/classes.json", r#"{"space":"mpcat40"}"#);
+    let link = |target: &str, path: &str| symlink(bench.path(target), make(path)).unwrap();
+    for class in [
+        "pictures/cat/0.png",
+        "pictures/dog/0.png",
+        "folders/cat/0.png",
+        "folders/dog/0.png",
+    ] {
+        fs::copy(bench.path("a.png"), make(class)).unwrap();
+    }
+    link("private/secret.png", "pictures/dog/1.png");
+    link("private", "folders/bird");
+    for set in ["questions", "frames", "maps"] {
+        fs::copy(bench.path("a.png"), make(&format!("{set}/a.png"))).unwrap();
+    }
+    link("private/questions.jsonl", "questions/questions.jsonl");
+    link("private/frames.jsonl", "frames/frames.jsonl");
+    bench.file("frames/questions.jsonl", question("s/0", "frame"));
+    link("private/classes.json", "maps/classes.json");
+    bench.file("maps/frames.jsonl", &frame);
+    link("private", "hub/datasets--x--y/blobs");
+    let picture = make("hub/datasets--x--y/snapshots/1/a.png");
+    symlink("../../blobs/secret.png", picture).unwrap();
+    bench.file(
+        "hub/datasets--x--y/snapshots/1/questions.jsonl",
+        question("a.png", "image"),
+    );
+    bench.file("hub/datasets--x--y/refs/main", "1");
+    link("private/questions.jsonl", "pattern/part-1.jsonl");
+    let calls = each(
+        [
+            "--data pictures --label-folders ?",
+            "--data folders --label-folders ?",
+            "--data questions",
+            "--data frames",
+            "--data maps",
+            "--data hub/datasets--x--y",
+            "--data pattern/*.jsonl",
+        ],
+        |data| {
+            let line = format!("{data} --model random --levels L0 --out run");
+            let called = bench.call(&words(&line));
+            let records = fs::read_to_string(bench.path("run/records.jsonl")).unwrap_or_default();
+            assert!(!records.contains(r#""width":9,"height":7"#), "{data}");
+            let _ = fs::remove_dir_all(bench.path("run"));
+            called.messages()
+        },
+    );
+    insta::assert_snapshot!(calls, @r#"
+    --data pictures --label-folders ?
+      exit code: 0
+       WARN pictures: 1 link leads out of the folder and is not followed: dog/1.png; --data-root [TMP]/private
+          allows the folder that it leads to
+       WARN a photograph may show things of several of the 2 classes, and the folder names one of them: that name is
+          the true choice; with boxes or tags, make questions instead
+    --data folders --label-folders ?
+      exit code: 0
+       WARN folders: 1 link leads out of the folder and is not followed: bird; --data-root [TMP]/private allows the
+          folder that it leads to
+       WARN a photograph may show things of several of the 2 classes, and the folder names one of them: that name is
+          the true choice; with boxes or tags, make questions instead
+    --data questions
+      exit code: 2
+      error: questions/questions.jsonl: leads out of questions, the folder of the data; --data-root [TMP]/private
+          allows the folder that it leads to
+    --data frames
+      exit code: 2
+      error: frames/frames.jsonl: leads out of frames, the folder of the data; --data-root [TMP]/private allows the
+          folder that it leads to
+    --data maps
+      exit code: 2
+      error: maps/classes.json: leads out of maps, the folder of the data; --data-root [TMP]/private allows the
+          folder that it leads to
+    --data hub/datasets--x--y
+      exit code: 2
+      error: hub/datasets--x--y/snapshots/1/questions.jsonl, line 1: "a.png" lies outside 1/, the folder of the
+          data; --data-root [TMP]/private allows the folder that it names; --skip bad leaves such rows out
+    --data pattern/*.jsonl
+      exit code: 2
+       WARN pattern: 1 link leads out of the folder and is not followed: part-1.jsonl; --data-root [TMP]/private
+          allows the folder that it leads to
+      error: --data: pattern/*.jsonl: no file has such a name
+    "#);
+    // The flag in the messages allows them.
+    for data in [
+        "--data questions",
+        "--data frames",
+        "--data pictures --label-folders ?",
+    ] {
+        let line = format!("{data} --model random --levels L0 --out run --data-root private");
+        bench.complete(&words(&line));
+        fs::remove_dir_all(bench.path("run")).unwrap();
+    }
 }
 
 #[test]

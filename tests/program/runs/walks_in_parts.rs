@@ -11,6 +11,7 @@ use serde_json::{Value, json};
 use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::process::{signal, wait_until};
 use crate::support::run::{Bench, assert_same_products, records, words};
+use crate::support::snapshot::each;
 
 /// Requests that are in flight at once.
 const IN_FLIGHT: usize = 2;
@@ -66,6 +67,77 @@ fn asked(run: &std::path::Path) -> BTreeMap<String, Value> {
         .into_iter()
         .map(|record| (record["key"].to_string(), record["reply"].clone()))
         .collect()
+}
+
+/// A stranger's list of questions may name any folder, and a walk may be a link.
+#[cfg(unix)]
+#[test]
+fn walks_outside_the_folder_are_not_sent() {
+    let bench = with_walks();
+    let mock = endpoint();
+    fs::rename(bench.path("walks/hm3d-v0/000-house"), bench.path("private")).unwrap();
+    let walks = bench.path("walks/hm3d-v0");
+    std::os::unix::fs::symlink(bench.path("private"), walks.join("link")).unwrap();
+    fs::create_dir(walks.join("frame")).unwrap();
+    let frame = "00000-rgb.png";
+    std::os::unix::fs::symlink(
+        bench.path("private").join(frame),
+        walks.join("frame").join(frame),
+    )
+    .unwrap();
+    let absolute = bench.path("private").display().to_string();
+    let ask = |walk: &str, more: &str| {
+        let question = json!([{"question_id": "q", "question": "Where?", "answer": "there", "category": "c", "episode_history": walk}]);
+        bench.file("questions.json", question.to_string());
+        bench.call(&words(&flags(&mock, more)))
+    };
+    let refusals = each(
+        [
+            "../private",
+            "hm3d-v0/../../private",
+            "absolute",
+            "hm3d-v0/link",
+            "hm3d-v0/frame",
+        ],
+        |walk| {
+            let walk = if *walk == "absolute" {
+                &absolute
+            } else {
+                *walk
+            };
+            ask(walk, "--out run").messages()
+        },
+    );
+    insta::assert_snapshot!(refusals, @r#"
+    ../private
+      exit code: 2
+      error: --frames: no walk can be shown: episode_history: "../private" lies outside walks/, the folder of the
+          data; --data-root [TMP] allows the folder that it names; DIR/EPISODE_HISTORY/*-rgb.png expected
+    hm3d-v0/../../private
+      exit code: 2
+      error: --frames: no walk can be shown: episode_history: "hm3d-v0/../../private" lies outside walks/, the
+          folder of the data; --data-root [TMP] allows the folder that it names; DIR/EPISODE_HISTORY/*-rgb.png
+          expected
+    absolute
+      exit code: 2
+      error: --frames: no walk can be shown: episode_history: "[TMP]/private" lies outside walks/, the folder of the
+          data; --data-root [TMP] allows the folder that it names; DIR/EPISODE_HISTORY/*-rgb.png expected
+    hm3d-v0/link
+      exit code: 2
+      error: --frames: no walk can be shown: episode_history: "hm3d-v0/link" lies outside walks/, the folder of the
+          data; --data-root [TMP] allows the folder that it names; DIR/EPISODE_HISTORY/*-rgb.png expected
+    hm3d-v0/frame
+      exit code: 2
+      error: --frames: no walk can be shown: walks/hm3d-v0/frame/00000-rgb.png: leads out of walks, the folder of
+          the data; --data-root [TMP]/private allows the folder that it leads to; DIR/EPISODE_HISTORY/*-rgb.png
+          expected
+    "#);
+    assert!(mock.requests().is_empty());
+    let allowed = ask("hm3d-v0/link", "--out run --data-root private");
+    assert_eq!(allowed.code, Some(0), "{allowed:?}");
+    assert!(!mock.requests().is_empty());
+    let shown = bench.call(&words("show run q --condition L3-noise"));
+    assert_eq!(shown.code, Some(0), "{shown:?}");
 }
 
 #[test]

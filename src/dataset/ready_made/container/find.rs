@@ -9,6 +9,7 @@ use super::shards::{check_shards, single_shard_note};
 use super::tree::Tree;
 use super::{SetFile, extension};
 use crate::dataset::ready_made::settings::SetArgs;
+use crate::dataset::root::{Location, Root};
 use crate::error::{Error, Result};
 
 /// Files of a set, and the folders that may have its images.
@@ -138,17 +139,28 @@ fn files_at(place: &Path, args: &SetArgs) -> Result<FoundFiles> {
             notes: single_shard_note(place).into_iter().collect(),
         });
     }
-    matching_files(place, &text)
+    matching_files(place, &text, args)
 }
 
-/// Files that match a pattern.
-fn matching_files(place: &Path, text: &str) -> Result<FoundFiles> {
+/// Files that match a pattern. Links out of the folder before its first wildcard are skipped; a warning names the first.
+fn matching_files(place: &Path, text: &str, args: &SetArgs) -> Result<FoundFiles> {
     let paths = glob::glob(text)
         .map_err(|e| Error::usage("--data", format_args!("{text}: not a pattern: {e}")))?;
-    let files: Vec<PathBuf> = paths
-        .filter_map(std::result::Result::ok)
-        .filter(|path| path.is_file())
+    let folder: PathBuf = place
+        .iter()
+        .take_while(|part| !part.to_string_lossy().contains(['*', '?', '[']))
         .collect();
+    let root = Root::new(&folder, &args.root.data_root)?;
+    let mut links_out = Vec::new();
+    let mut files = Vec::new();
+    for path in paths.filter_map(std::result::Result::ok) {
+        match root.locate(&path) {
+            Location::Inside if path.is_file() => files.push(path),
+            Location::Outside => links_out.push(path),
+            Location::Inside | Location::Missing => {}
+        }
+    }
+    root.warn_of_links_out(&links_out);
     if files.is_empty() {
         return Err(Error::usage(
             "--data",
@@ -156,10 +168,6 @@ fn matching_files(place: &Path, text: &str) -> Result<FoundFiles> {
         ));
     }
     check_shards(&files)?;
-    let folder = place
-        .iter()
-        .take_while(|part| !part.to_string_lossy().contains(['*', '?', '[']))
-        .collect();
     Ok(FoundFiles {
         files: files
             .into_iter()

@@ -34,18 +34,21 @@ impl Tree {
                 .filter(|path| is_cached_repository(path));
             return Ok(Self::Folder {
                 folder: place.to_owned(),
-                blobs: repository.map(|path| path.join("blobs")),
+                blobs: repository.and_then(own_blobs),
             });
         }
         let head = reading::text(&place.join("refs/main"))?;
         let snapshot = place.join("snapshots").join(head.trim());
-        if !snapshot.is_dir() || head.trim().contains(['/', '\\']) {
+        let is_own = snapshot
+            .canonicalize()
+            .is_ok_and(|real| real.starts_with(&canonical));
+        if !snapshot.is_dir() || !is_own || head.trim().contains(['/', '\\']) {
             let problem = "refs/main names no folder in snapshots; download the repository again";
             return Err(Error::data(place.display(), problem));
         }
         Ok(Self::Folder {
             folder: snapshot,
-            blobs: Some(place.join("blobs")),
+            blobs: own_blobs(&canonical),
         })
     }
 
@@ -62,13 +65,8 @@ impl Tree {
         match self {
             Self::Archive(archive) => Ok((archive.files(), Vec::new())),
             Self::Folder { folder, blobs } => {
-                let blobs: Vec<PathBuf> = blobs
-                    .iter()
-                    .filter(|blobs| blobs.is_dir())
-                    .cloned()
-                    .collect();
                 let mut scan = Scan {
-                    root: Root::new(folder, &blobs)?,
+                    root: Root::new(folder, blobs.as_slice())?,
                     files: Vec::new(),
                     outside: Vec::new(),
                 };
@@ -86,7 +84,8 @@ impl Tree {
     /// True if the tree has a file with this path.
     pub(super) fn has(&self, path: &str) -> bool {
         match self {
-            Self::Folder { folder, .. } => folder.join(path).is_file(),
+            Self::Folder { folder, blobs } => Root::new(folder, blobs.as_slice())
+                .is_ok_and(|root| root.locate(&folder.join(path)) == Location::Inside),
             Self::Archive(archive) => archive.has(path),
         }
     }
@@ -111,6 +110,12 @@ impl Tree {
     pub(super) fn full_path(&self, path: &Path) -> PathBuf {
         self.place().join(path)
     }
+}
+
+/// Folder `blobs` of a repository in a hub's cache; `None` if there is none, or if it is a link out of the repository.
+fn own_blobs(repository: &Path) -> Option<PathBuf> {
+    let blobs = repository.join("blobs").canonicalize().ok()?;
+    (blobs.is_dir() && blobs.starts_with(repository)).then_some(blobs)
 }
 
 fn is_cached_repository(path: &Path) -> bool {

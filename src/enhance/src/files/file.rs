@@ -238,21 +238,44 @@ fn output_count(model: &[u8]) -> usize {
 /// Path of a file of external data.
 ///
 /// # Errors
-/// If the file is not in the model's folder or a subfolder. ONNX Runtime refuses such files too.
+/// If the file is not in the model's folder or a subfolder, by its name or by a link. ONNX Runtime refuses such names too, and not in
+/// every version such links.
 fn external_path(model: &Path, location: &str) -> Result<PathBuf> {
     let relative = Path::new(location);
     let is_inside = relative
         .components()
         .all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
-    if !is_inside || location.is_empty() {
-        return Err(Error::Enhancer {
-            path: model.to_owned(),
-            problem: format!(
-                "has its weights in {location:?}, outside its folder; export it again with the weights in the same folder"
-            ),
-        });
+    let folder = model.with_file_name("");
+    let path = folder.join(relative);
+    if is_inside && !location.is_empty() && !leads_out(model, &path) {
+        return Ok(path);
     }
-    Ok(model.with_file_name("").join(relative))
+    Err(Error::Enhancer {
+        path: model.to_owned(),
+        problem: format!(
+            "has its weights in {location:?}, outside its folder; copy them there as a file of their own, or export it again with the weights in \
+             the same folder"
+        ),
+    })
+}
+
+/// True if a file exists and is, with links resolved, neither below the model's folder nor below the folder that the model itself is a link
+/// into: in a hub's cache, both are links into one folder.
+fn leads_out(model: &Path, file: &Path) -> bool {
+    let Ok(real) = file.canonicalize() else {
+        return false;
+    };
+    let folder = match model.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    let model = model.canonicalize().ok();
+    let own = model.as_deref().and_then(Path::parent);
+    let folders = [folder.canonicalize().ok(), own.map(Path::to_owned)];
+    !folders
+        .iter()
+        .flatten()
+        .any(|folder| real.starts_with(folder))
 }
 
 /// Reads a file of external data.
@@ -362,6 +385,34 @@ mod tests {
         for (i, digest) in all.iter().enumerate() {
             assert!(!all[..i].contains(digest), "{i}");
         }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn weights_are_not_read_through_links_out_of_the_folder() {
+        use std::os::unix::fs::symlink;
+
+        let outer = tempfile::tempdir().unwrap();
+        let path = |name: &str| outer.path().join(name);
+        for folder in ["own", "cache", "private"] {
+            std::fs::create_dir(path(folder)).unwrap();
+        }
+        std::fs::write(path("private/a.bin"), [1]).unwrap();
+        std::fs::write(path("own/a.onnx"), model("a.bin")).unwrap();
+        symlink(path("private/a.bin"), path("own/a.bin")).unwrap();
+        let refused = ModelFile::read(&path("own/a.onnx")).unwrap_err();
+        assert!(
+            refused.to_string().contains("outside its folder"),
+            "{refused}"
+        );
+        std::fs::remove_file(path("own/a.bin")).unwrap();
+        std::fs::copy(path("private/a.bin"), path("own/a.bin")).unwrap();
+        assert!(ModelFile::read(&path("own/a.onnx")).is_ok());
+        // In a hub's cache, the model and its weights are links into the same folder.
+        for name in ["a.onnx", "a.bin"] {
+            symlink(path("own").join(name), path("cache").join(name)).unwrap();
+        }
+        assert!(ModelFile::read(&path("cache/a.onnx")).is_ok());
     }
 
     #[test]

@@ -119,7 +119,8 @@ fn check_data(
         let rules = rules(selection.rules.as_deref())?;
         open_data(&place, &args.scene, set, selection, &rules, rule, progress)
     });
-    let opened = opened.and_then(|dataset| Ok((dataset, args.scene.set_light(&place)?)));
+    let opened = opened
+        .and_then(|dataset| Ok((dataset, args.scene.set_light(&place, &set.root.data_root)?)));
     let (mut dataset, light) = match opened {
         Ok(opened) => opened,
         Err(e) => {

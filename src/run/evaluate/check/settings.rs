@@ -16,7 +16,7 @@ use darkqa_light::LightSettings;
 /// Checks the flags and the files that they name. No data is read.
 pub(super) fn check_settings(args: &EvaluateArgs, findings: &mut Findings) {
     let place = args.scene.place(args.data.place());
-    let set = args.scene.set_light(&place);
+    let set = args.scene.set_light(&place, &args.data.set.root.data_root);
     let light = set.and_then(|set| Ok((set, LightSettings::resolve(&args.job.light, set)?)));
     match &light {
         Ok((set, light)) => {

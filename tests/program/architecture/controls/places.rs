@@ -34,6 +34,36 @@ fn missing_code_and_long_files_reported() {
 }
 
 #[test]
+fn listings_in_other_places_are_reported() {
+    let rule = |files: &Files| rules::listings(files, &["dataset"], &["dataset/root.rs"]);
+    let unused = "a list of a folder or an open file may stand in dataset/root.rs, but does not: delete this place";
+    check(
+        rule,
+        &[
+            "src/dataset/a.rs:1: a list of a folder or an open file may stand only in dataset/root.rs",
+            unused,
+        ],
+        &[
+            "dataset/a.rs: use crate::files::reading::entries;",
+            "dataset/a.rs: fn f() { std::fs::read(p) }",
+            "dataset/a.rs: fn f() { File::open(p) }",
+        ],
+    );
+    check(
+        rule,
+        &[],
+        &[
+            "dataset/root.rs: fn f() { reading::entries(p) } ++ engine/a.rs: fn f() { std::fs::read(p) }",
+        ],
+    );
+    check(
+        rule,
+        &[unused],
+        &["dataset/a.rs: #[cfg(test)] mod tests { fn f() { std::fs::read(p) } }"],
+    );
+}
+
+#[test]
 fn misplaced_awaits_are_reported() {
     let rule = |files: &Files| rules::awaits(files, &["ask"]);
     let unused = "`.await` may stand in ask, but does not: delete this place";

@@ -180,8 +180,7 @@ fn missing_answers_are_counted() {
     insta::assert_snapshot!(called.messages(), @"
     exit code: 2
      WARN ids.json: 1 of 4 ids are not in the file of questions: q9
-    error: --frames: no walk can be shown: walks/hm3d-v0/000-a: cannot read: [OS ERROR];
-        DIR/EPISODE_HISTORY/*-rgb.png expected
+    error: --frames: no walk can be shown: walks: cannot read: [OS ERROR]; DIR/EPISODE_HISTORY/*-rgb.png expected
     ");
 }
 
