@@ -105,6 +105,22 @@ pub(in crate::ask) fn image_tokens(
     Some(rule.count(detail, width as f64, height as f64))
 }
 
+/// Number of tokens of an image for a family that has more of them for larger images, so that fewer tokens mean a smaller image; `None`
+/// for other families: those whose number hardly depends on the size, and Gemini, whose servers choose the number of crops.
+pub(crate) fn scaling_image_tokens(
+    model: &str,
+    detail: Option<ImageDetail>,
+    width: u64,
+    height: u64,
+) -> Option<u64> {
+    let rule = family(model)?.rule;
+    let is_scaling = !matches!(
+        rule,
+        Rule::Fixed { .. } | Rule::Crops | Rule::Filled { .. } | Rule::Grid { .. }
+    );
+    is_scaling.then(|| rule.count(detail, width as f64, height as f64))
+}
+
 /// The family of a model, by the beginning of its name.
 fn family(model: &str) -> Option<&'static Family> {
     let name = model.rsplit('/').next().unwrap_or(model).to_lowercase();

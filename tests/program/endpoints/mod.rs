@@ -9,4 +9,5 @@ mod pauses;
 mod replicas;
 mod serve;
 mod several_images;
+mod shrunk_images;
 mod truncated;
