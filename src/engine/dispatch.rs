@@ -174,6 +174,7 @@ impl<I: Item> ReplySink<'_, I> {
         let mut tick = tokio::time::interval(LINE_INTERVAL);
         let spending = Arc::clone(self.budget.spending());
         self.limits.warn_unlimited(&spending);
+        self.limits.warn_unpriced(&self.dispatcher.settings.money);
         loop {
             while let Some(ready) = self.next(&mut lanes) {
                 match self.permit(&ready) {
@@ -446,6 +447,7 @@ impl<I: Item> ReplySink<'_, I> {
             self.first_questions[trial.model] = FirstQuestion::Ended;
         }
         self.limits.warn_exceeded(trial.model, &self.budget);
+        self.limits.warn_of_charges(trial.model, &self.budget);
         match &result {
             Ok(_) => {
                 self.breaker.succeeded(trial.model);

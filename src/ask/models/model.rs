@@ -118,6 +118,11 @@ impl Model {
         scaling_image_tokens(model, *detail, width, height)
     }
 
+    /// Service tier that requests ask for; `None` if they leave it to the server.
+    pub(crate) fn service_tier(&self) -> Option<&str> {
+        self.remote()?.parameters().extra.service_tier()
+    }
+
     /// Maximum number of tokens in a reply; `None` for models without this limit.
     #[must_use]
     pub fn max_tokens(&self) -> Option<u32> {

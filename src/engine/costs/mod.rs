@@ -9,6 +9,7 @@ mod money;
 pub(crate) mod plan_costs;
 mod planned_images;
 mod prompt_bounds;
+mod stored_costs;
 mod token_check;
 
 pub(crate) use budget::text_tokens;

@@ -10,4 +10,5 @@ mod replicas;
 mod serve;
 mod several_images;
 mod shrunk_images;
+mod stated_costs;
 mod truncated;
