@@ -25,7 +25,8 @@ mod wire_kind;
 
 pub(crate) use batch_interface::BatchInterface;
 pub(crate) use costs::{
-    Price, PricedRequest, Prices, ReplyExcess, Reservation, Spending, TokenBound,
+    ChargeRatios, ImageTokenCheck, Price, PricedRequest, Prices, ReplyExcess, Reservation,
+    Spending, TokenBound, Unpriced, scaling_image_tokens, stated_charge,
 };
 pub use endpoints::{Access, BaseUrl, Endpoint, Sending};
 pub(crate) use endpoints::{AccessArgs, OPENAI_KEY, Server, sleep_running, vendor_variables};

@@ -13,9 +13,7 @@ use tokio::time::timeout;
 
 use crate::ask::{AskError, Call, Reach, Reservation, sleep_running};
 use crate::engine::circuit_breaker::{CircuitBreaker, EndReason};
-use crate::engine::costs::{
-    Budget, BudgetNotes, InFlightCost, MeasuredTokens, Permit, text_tokens,
-};
+use crate::engine::costs::{Budget, BudgetNotes, InFlightCost, Permit, TokenCheck};
 use crate::engine::first_failures::FirstFailures;
 use crate::engine::interrupt::Interrupt;
 use crate::engine::lanes::{Lanes, PreparedTrial};
@@ -88,9 +86,8 @@ impl Dispatcher<'_> {
             stoppers,
             answered: counts.answered,
             truncation: TruncationCheck::new(self.token_flag),
-            measured: MeasuredTokens::new(self.models.len()),
+            tokens: TokenCheck::new(self.models.len()),
             dependence: vec![ImageDependence::default(); self.models.len()],
-            is_estimate_compared: vec![false; self.models.len()],
             first_questions: vec![FirstQuestion::NotAsked; self.models.len()],
             limits: BudgetNotes::new(self.models),
             given_up: watch::Sender::new(false),
@@ -138,12 +135,10 @@ struct ReplySink<'a, I: Item> {
     /// Number of trials with a reply, including those of earlier calls.
     answered: usize,
     truncation: TruncationCheck,
-    /// Tokens charged for the images of the replies.
-    measured: MeasuredTokens,
+    /// Comparison of the charged tokens with the estimated ones.
+    tokens: TokenCheck,
     /// Check of each model that its replies depend on the image.
     dependence: Vec<ImageDependence>,
-    /// True for models whose estimated tokens have been compared with the charged ones.
-    is_estimate_compared: Vec<bool>,
     /// State of the first question to each model.
     first_questions: Vec<FirstQuestion>,
     /// Notices about the limit of cost.
@@ -179,6 +174,7 @@ impl<I: Item> ReplySink<'_, I> {
         let mut tick = tokio::time::interval(LINE_INTERVAL);
         let spending = Arc::clone(self.budget.spending());
         self.limits.warn_unlimited(&spending);
+        self.limits.warn_unpriced(&self.dispatcher.settings.money);
         loop {
             while let Some(ready) = self.next(&mut lanes) {
                 match self.permit(&ready) {
@@ -434,39 +430,6 @@ impl<I: Item> ReplySink<'_, I> {
         }
     }
 
-    /// Compares the charged tokens of images with the estimate, once for each model, and warns if they differ.
-    fn compare_with_estimate(&mut self, ready: &PreparedTrial<I>, reply: &Reply) {
-        let model = ready.trial.model;
-        let charged = reply.usage.and_then(|usage| usage.prompt_tokens);
-        let Some(charged) = charged.filter(|_| !ready.stimulus.images.is_empty()) else {
-            return;
-        };
-        if self.is_estimate_compared[model] {
-            return;
-        }
-        let text = text_tokens(&ready.trial.prompt);
-        let shown = ready.stimulus.images.len();
-        self.measured.add(model, charged, text, shown);
-        if self.measured.image(model).is_none() {
-            return;
-        }
-        self.is_estimate_compared[model] = true;
-        let images = ready.stimulus.images.iter().map(|image| image.facts());
-        let difference = self
-            .budget
-            .expected_image_tokens(model, &self.dispatcher.models[model], images)
-            .and_then(|tokens| self.measured.difference(model, text, shown, tokens));
-        if let Some(difference) = difference {
-            tracing::warn!(
-                "{}: a prompt is charged {:.0} tokens, where {:.0} were estimated (median of the first 10 with images); --dry-run \
-                 estimates the rest of this run by what is charged",
-                self.dispatcher.models[model].name,
-                difference.charged,
-                difference.estimated
-            );
-        }
-    }
-
     /// Stores the reply or the failure of one trial.
     fn store_result(&mut self, done: Result<Finished<I>, JoinError>) -> Result<()> {
         let (ready, result) = match done {
@@ -484,6 +447,7 @@ impl<I: Item> ReplySink<'_, I> {
             self.first_questions[trial.model] = FirstQuestion::Ended;
         }
         self.limits.warn_exceeded(trial.model, &self.budget);
+        self.limits.warn_of_charges(trial.model, &self.budget);
         match &result {
             Ok(_) => {
                 self.breaker.succeeded(trial.model);
@@ -514,10 +478,11 @@ impl<I: Item> ReplySink<'_, I> {
         if let Ok(reply) = &result {
             self.answered += 1;
             self.truncation.count(reply);
-            self.compare_with_estimate(&ready, reply);
             if let Some(usage) = reply.usage {
                 let model = &self.dispatcher.models[trial.model];
                 let images = ready.stimulus.images.iter().map(|image| image.facts());
+                self.tokens
+                    .add(model, trial, images.clone(), usage, &self.budget);
                 self.budget.observe(model, trial, images, usage);
             }
         }

@@ -19,7 +19,7 @@ use std::sync::Arc;
 
 use serde_json::{Value, json};
 
-use crate::ask::{Endpoint, Model, Parameters, Price, Prices, Remote, Script, Server};
+use crate::ask::{Endpoint, Model, Parameters, Price, Prices, Remote, Script, Server, Unpriced};
 use crate::error::{Error, Result};
 use crate::images::trials::{Item, Stimulus, Trial};
 use crate::runs::renamed::ADAPTED_FOR;
@@ -81,10 +81,22 @@ impl ModelUnderTest {
 
     /// Price of the model's tokens; `None` if it is built in or the price is unknown.
     pub(crate) fn price(&self, prices: &Prices) -> Option<Price> {
+        self.priced(prices).ok().flatten()
+    }
+
+    /// Price of the model's tokens at the service tier that its requests ask for; `None` if it is built in.
+    ///
+    /// # Errors
+    /// The reason why the price is unknown.
+    pub(crate) fn priced(&self, prices: &Prices) -> std::result::Result<Option<Price>, Unpriced> {
         if !self.model.is_remote() {
-            return None;
+            return Ok(None);
         }
-        self.price.or_else(|| prices.find(self.model.name()))
+        let tier = self.model.service_tier();
+        match self.price {
+            Some(own) => Ok(Some(own.as_asked(tier))),
+            None => prices.price(self.model.name(), tier).map(Some),
+        }
     }
 
     /// The record of a trial, without an outcome.

@@ -132,6 +132,7 @@ impl<E: Experiment> OpenRun<'_, E> {
             limit,
             spent,
             longer_replies: longer_replies(&models, &trials),
+            dearer_replies: budget.dearer().clone(),
         });
         OverBudget::note(over.as_ref(), &mut self.manifest);
         self.warn_unstated(&budget)?;

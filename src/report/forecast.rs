@@ -37,8 +37,33 @@ pub(crate) struct CostLine {
     /// Tokens of one image as charged for the replies so far; `None` if there are too few replies.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub charged_image_tokens: Option<f64>,
+    /// Ratio of the charges that the server has stated so far to the price table, by which the costs are multiplied; `None` without such
+    /// charges.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub charge_ratio: Option<f64>,
     /// The same requests by the noise profile of their images.
     pub readings: Vec<ProfileCost>,
+}
+
+impl CostLine {
+    /// The same line, with costs at this ratio to the price table.
+    pub(crate) fn at_ratio(self, ratio: Option<f64>) -> Self {
+        let times = |dollars: Option<f64>| dollars.map(|dollars| ratio.unwrap_or(1.0) * dollars);
+        Self {
+            dollars: times(self.dollars),
+            most_dollars: times(self.most_dollars),
+            charge_ratio: ratio,
+            readings: self
+                .readings
+                .into_iter()
+                .map(|profile| ProfileCost {
+                    dollars: times(profile.dollars),
+                    ..profile
+                })
+                .collect(),
+            ..self
+        }
+    }
 }
 
 /// Remaining requests with images of one noise profile.
@@ -51,6 +76,9 @@ pub(crate) struct ProfileCost {
     /// Cost in dollars if each reply is short; `None` if no price is known.
     pub dollars: Option<f64>,
 }
+
+/// Relative difference of charges from the price table from which it is printed; chosen.
+const TOLD_FROM: f64 = 0.05;
 
 /// Estimate of a run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -222,6 +250,18 @@ pub(crate) fn render(forecast: &Forecast) -> String {
                 "{}: {} tokens an image, as its first replies were charged",
                 line.model,
                 count(tokens)
+            );
+        }
+    }
+    for line in &forecast.lines {
+        if let Some(ratio) = line
+            .charge_ratio
+            .filter(|ratio| (ratio - 1.0).abs() > TOLD_FROM)
+        {
+            let _ = writeln!(
+                text,
+                "{}: dollars at {ratio:.2} times the price table, as its replies were charged",
+                line.model
             );
         }
     }
@@ -405,6 +445,7 @@ mod tests {
             dollars: None,
             most_dollars: None,
             charged_image_tokens: None,
+            charge_ratio: None,
             readings,
         }
     }

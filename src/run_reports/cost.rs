@@ -4,12 +4,12 @@ use std::collections::HashMap;
 
 use serde_json::Value;
 
-use crate::ask::{Price, Prices};
+use crate::ask::{Price, Prices, stated_charge};
 use crate::error::Result;
 use crate::report::forecast::money;
 use crate::types::manifests::RunManifest;
 use crate::types::text;
-use crate::types::{TrialRef, Via};
+use crate::types::{TrialRef, Usage, Via};
 use darkqa_score::answers::record::Detail;
 
 /// A run with the prices stored in its manifest.
@@ -55,7 +55,7 @@ impl<'m> PricedRun<'m> {
             self.by_model.insert(model.to_owned(), price);
             price
         };
-        price.map(|price| TrialCost::new(price, self.prices.batch, trial))
+        TrialCost::new(price, self.prices.batch, trial)
     }
 
     /// Source of the prices used so far, as a phrase that follows "at".
@@ -70,27 +70,52 @@ impl<'m> PricedRun<'m> {
 }
 
 /// The cost of a trial, in US dollars.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct TrialCost {
-    /// Cost of the reply; `None` without a reply, or if the server did not report its tokens.
+    /// Cost of the reply; `None` without a reply, or if the server reports neither its tokens nor its charge.
     pub(super) reply: Option<f64>,
     /// Cost of attempts without a usable reply; `None` if there were none.
     pub(super) lost: Option<f64>,
+    /// The part of both that the server states as its charge.
+    stated: f64,
+    /// The price of the tokens of this part by the price table; `None` if the price is unknown.
+    listed: Option<f64>,
 }
 
 impl TrialCost {
-    /// The cost of a trial at a price. `batch` is the price of a batch request as a fraction of the direct price.
-    fn new<D: Detail>(price: Price, batch: f64, trial: TrialRef<'_, D>) -> Self {
+    /// The cost of a trial: as the server states it, else at a price. `batch` is the price of a batch request as a fraction of the direct
+    /// price. `None` if neither is known.
+    fn new<D: Detail>(price: Option<Price>, batch: f64, trial: TrialRef<'_, D>) -> Option<Self> {
         let share = match trial.via() {
             Via::Direct | Via::File => 1.0,
             Via::Batch => batch,
         };
-        let lost = Some(trial.lost()).filter(|lost| !lost.is_none());
-        let usage = trial.usage().filter(|_| trial.has_reply());
-        Self {
-            reply: usage.map(|usage| share * price.charged(usage)),
-            lost: lost.map(|lost| share * price.charged(lost.usage)),
+        let mut cost = Self {
+            listed: price.map(|_| 0.0),
+            ..Self::default()
+        };
+        if let Some(usage) = trial.usage().filter(|_| trial.has_reply()) {
+            cost.reply = cost.add(price, share, usage);
         }
+        let lost = trial.lost();
+        if !lost.is_none() {
+            cost.lost = cost.add(price, share, lost.usage);
+        }
+        (price.is_some() || cost.reply.is_some() || cost.lost.is_some()).then_some(cost)
+    }
+
+    /// The cost of one usage; `None` if it is unknown.
+    fn add(&mut self, price: Option<Price>, share: f64, usage: Usage) -> Option<f64> {
+        let listed = price.map(|price| share * price.list_charge(usage));
+        // Servers without prices of their own state 0.
+        let stated = stated_charge(usage, listed.unwrap_or(0.0))
+            .filter(|stated| price.is_some() || *stated > 0.0);
+        let Some(stated) = stated else {
+            return listed;
+        };
+        self.stated += stated;
+        self.listed = self.listed.zip(listed).map(|(sum, listed)| sum + listed);
+        Some(stated)
     }
 }
 
@@ -102,7 +127,12 @@ pub(crate) fn price(prices: &Prices, manifest: &RunManifest, model: &str) -> Opt
             .get("model")
             .and_then(|models| models.get(model));
         let id = columns.and_then(|content| content.get("--model")?.as_str());
-        prices.find(id.unwrap_or(model))
+        let added = columns.and_then(|content| content.get("--extra-body")?.as_str());
+        let added: Option<Value> = added.and_then(|json| serde_json::from_str(json).ok());
+        let tier = added
+            .as_ref()
+            .and_then(|added| added.get("service_tier")?.as_str());
+        prices.price(id.unwrap_or(model), tier).ok()
     })
 }
 
@@ -128,10 +158,15 @@ pub(super) fn cost_text<'t, D: Detail + 't>(
     manifest: &RunManifest,
 ) -> Result<Option<String>> {
     let mut run = PricedRun::new(manifest)?;
+    let (mut stated, mut listed) = (0.0, Some(0.0));
     let (mut dollars, mut counted, mut unknown) = (0.0, 0_usize, 0_usize);
     let (mut lost_dollars, mut attempts) = (0.0, 0_u32);
     for trial in trials.filter(|trial| trial.has_reply() || !trial.lost().is_none()) {
         let cost = run.trial_cost(trial.model(), trial);
+        if let Some(cost) = cost {
+            stated += cost.stated;
+            listed = listed.zip(cost.listed).map(|(sum, more)| sum + more);
+        }
         match cost.and_then(|cost| cost.reply) {
             Some(reply) => {
                 dollars += reply;
@@ -159,6 +194,37 @@ pub(super) fn cost_text<'t, D: Detail + 't>(
             text::plural(n, "reply", "replies")
         ),
     };
-    let (source, all) = (run.source(), money(dollars + lost_dollars));
-    Ok((counted > 0 || attempts > 0).then(|| format!("{all} at {source}{lost}{note}")))
+    let all = dollars + lost_dollars;
+    let source = cost_source(all, stated, listed, &run.source());
+    let all = money(all);
+    Ok((counted > 0 || attempts > 0).then(|| format!("{all} {source}{lost}{note}")))
 }
+
+/// Source of a cost, of which the servers state a part; `listed` is the price of this part by the price table.
+fn cost_source(all: f64, stated: f64, listed: Option<f64>, prices: &str) -> String {
+    if stated <= 0.0 {
+        return format!("at {prices}");
+    }
+    let is_all = all - stated <= ROUNDING * all;
+    let part = if is_all {
+        "as its replies state".to_owned()
+    } else {
+        format!(
+            "({} of it as its replies state, the rest at {prices})",
+            money(stated)
+        )
+    };
+    match listed {
+        Some(listed) if (stated - listed).abs() > TOLD_FROM * listed => {
+            let those = if is_all { "" } else { " for these replies" };
+            format!("{part}, against {}{those} at {prices}", money(listed))
+        }
+        _ => part,
+    }
+}
+
+/// Share of a sum up to which a difference is a rounding error; chosen.
+const ROUNDING: f64 = 1e-6;
+
+/// Relative difference between stated charges and the price table from which both are printed; chosen, as during a run.
+const TOLD_FROM: f64 = 0.05;

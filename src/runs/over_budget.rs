@@ -21,6 +21,9 @@ pub(crate) struct OverBudget {
     /// Number of replies that were charged more tokens than their limit, by model.
     #[serde(default)]
     pub(crate) longer_replies: BTreeMap<String, usize>,
+    /// Number of replies that were charged more than the price table says, by model.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub(crate) dearer_replies: BTreeMap<String, usize>,
 }
 
 impl OverBudget {
@@ -39,18 +42,27 @@ impl OverBudget {
 
     /// A sentence about the cost, with the cause if it is known.
     pub(crate) fn sentence(&self) -> String {
-        let replies: Vec<String> = self
-            .longer_replies
-            .iter()
-            .map(|(model, count)| format!("{model} ({count})"))
-            .collect();
-        let cause = match &replies[..] {
-            [] => String::new(),
-            replies => format!(
-                "; replies that were charged more tokens than --max-tokens: {}",
-                replies.join(", ")
+        let causes = [
+            (
+                &self.longer_replies,
+                "replies that were charged more tokens than --max-tokens",
             ),
-        };
+            (
+                &self.dearer_replies,
+                "replies that were charged more than the price table",
+            ),
+        ];
+        let cause: String = causes
+            .into_iter()
+            .filter(|(replies, _)| !replies.is_empty())
+            .map(|(replies, what)| {
+                let replies: Vec<String> = replies
+                    .iter()
+                    .map(|(model, count)| format!("{model} ({count})"))
+                    .collect();
+                format!("; {what}: {}", replies.join(", "))
+            })
+            .collect();
         format!(
             "The requests cost {}, more than the {} of --max-cost{cause}.",
             money(self.spent),
@@ -69,10 +81,17 @@ mod tests {
             limit: 0.5,
             spent: 2.0,
             longer_replies: BTreeMap::new(),
+            dearer_replies: BTreeMap::new(),
         };
         let plain = "The requests cost $2.00, more than the $0.5000 of --max-cost.";
         assert_eq!(over.sentence(), plain);
         over.longer_replies.insert("m".to_owned(), 3);
         assert!(over.sentence().ends_with("than --max-tokens: m (3)."));
+        over.longer_replies.clear();
+        over.dearer_replies.insert("m".to_owned(), 2);
+        let sentence = over.sentence();
+        assert!(
+            sentence.ends_with("; replies that were charged more than the price table: m (2).")
+        );
     }
 }

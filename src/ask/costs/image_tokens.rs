@@ -67,11 +67,25 @@ enum Rule {
     },
     Resized {
         patch: f64,
+        least: f64,
+        most: f64,
     },
-    Merged {
+    Rows {
         patch: f64,
-        #[serde(default = "unlimited")]
         side: f64,
+    },
+    Padded {
+        patch: f64,
+        side: f64,
+        most: f64,
+    },
+    Filled {
+        most: f64,
+    },
+    Grid {
+        tile: f64,
+        tokens: f64,
+        most: u32,
     },
 }
 
@@ -87,12 +101,33 @@ pub(in crate::ask) fn image_tokens(
     width: u64,
     height: u64,
 ) -> Option<u64> {
+    let rule = family(model)?.rule;
+    Some(rule.count(detail, width as f64, height as f64))
+}
+
+/// Number of tokens of an image for a family that has more of them for larger images, so that fewer tokens mean a smaller image; `None`
+/// for other families: those whose number hardly depends on the size, and Gemini, whose servers choose the number of crops.
+pub(crate) fn scaling_image_tokens(
+    model: &str,
+    detail: Option<ImageDetail>,
+    width: u64,
+    height: u64,
+) -> Option<u64> {
+    let rule = family(model)?.rule;
+    let is_scaling = !matches!(
+        rule,
+        Rule::Fixed { .. } | Rule::Crops | Rule::Filled { .. } | Rule::Grid { .. }
+    );
+    is_scaling.then(|| rule.count(detail, width as f64, height as f64))
+}
+
+/// The family of a model, by the beginning of its name.
+fn family(model: &str) -> Option<&'static Family> {
     let name = model.rsplit('/').next().unwrap_or(model).to_lowercase();
-    let family = TABLE
+    TABLE
         .family
         .iter()
-        .find(|family| family.begins.iter().any(|begin| name.starts_with(begin)))?;
-    Some(family.rule.count(detail, width as f64, height as f64))
+        .find(|family| family.begins.iter().any(|begin| name.starts_with(begin)))
 }
 
 impl Rule {
@@ -134,10 +169,38 @@ impl Rule {
                 let unit = (shorter / 1.5).floor().max(1.0);
                 258.0 * (width / unit).ceil() * (height / unit).ceil()
             }
-            Self::Resized { patch } => patches_after_resize(width, height, patch),
-            Self::Merged { patch, side } => {
-                let scale = (side / longer).min(1.0);
-                (width * scale / patch).round().max(1.0) * (height * scale / patch).round().max(1.0)
+            Self::Resized { patch, least, most } => {
+                patches_after_resize(width, height, patch, (least, most))
+            }
+            Self::Rows { patch, side } => {
+                let ratio = (longer / side).max(1.0);
+                let [columns, rows] = [width, height]
+                    .map(|length| ((length / ratio).round_ties_even().max(1.0) / patch).ceil());
+                (columns + 1.0) * rows
+            }
+            Self::Padded { patch, side, most } => {
+                // The limit applies to patches before 2 × 2 of them are merged.
+                let [columns, rows] =
+                    [width, height].map(|length| (2.0 * length / patch).floor().max(1.0));
+                let scale = (4.0 * most / (columns * rows)).sqrt().min(side / longer);
+                let along =
+                    |length: f64| ((length * scale.min(1.0)).floor().max(1.0) / patch).ceil();
+                along(width) * along(height)
+            }
+            Self::Filled { most } => {
+                let scale = (most / (width * height)).sqrt();
+                let [columns, rows] = [width, height].map(|length| (length * scale).floor());
+                match (columns, rows) {
+                    (0.0, _) => (height / width).floor().min(most),
+                    (_, 0.0) => (width / height).floor().min(most),
+                    _ => columns * rows,
+                }
+            }
+            Self::Grid { tile, tokens, most } => {
+                let tiles = tiles_of_grid(width, height, tile, most);
+                // Several tiles are preceded by the whole image; a token marks the beginning and one the end.
+                let thumbnail = if tiles > 1.0 { 1.0 } else { 0.0 };
+                2.0 + tokens * (tiles + thumbnail)
             }
         };
         count.ceil() as u64
@@ -196,23 +259,40 @@ fn max_patches_within(width: f64, height: f64, patch: f64, limits: PatchLimits) 
     count_at(low)
 }
 
-/// Number of patches after Qwen's smart_resize.
-fn patches_after_resize(width: f64, height: f64, patch: f64) -> f64 {
-    const MIN: f64 = 4.0;
-    const MAX: f64 = 16_384.0;
+/// Number of patches after Qwen's smart_resize, between a least and a most number.
+fn patches_after_resize(width: f64, height: f64, patch: f64, (least, most): (f64, f64)) -> f64 {
     let count = |round: fn(f64) -> f64, scale: f64| {
         let [columns, rows] = [width, height].map(|side| round(side * scale / patch).max(1.0));
         columns * rows
     };
     let unscaled = count(f64::round_ties_even, 1.0);
     let area = width * height / (patch * patch);
-    if unscaled > MAX {
-        count(f64::floor, (MAX / area).sqrt())
-    } else if unscaled < MIN {
-        count(f64::ceil, (MIN / area).sqrt())
+    if unscaled > most {
+        count(f64::floor, (most / area).sqrt())
+    } else if unscaled < least {
+        count(f64::ceil, (least / area).sqrt())
     } else {
         unscaled
     }
+}
+
+/// Number of tiles of the grid with the aspect ratio closest to that of an image. Among equally close ones the largest that the image fills
+/// by half.
+fn tiles_of_grid(width: f64, height: f64, tile: f64, most: u32) -> f64 {
+    let mut grids: Vec<(u32, u32)> = (1..=most)
+        .flat_map(|columns| (1..=most / columns).map(move |rows| (columns, rows)))
+        .collect();
+    grids.sort_by_key(|(columns, rows)| columns * rows);
+    let (mut closest, mut tiles) = (f64::INFINITY, 1.0);
+    for (columns, rows) in grids {
+        let difference = (width / height - f64::from(columns) / f64::from(rows)).abs();
+        let count = f64::from(columns * rows);
+        let is_filled = width * height > 0.5 * tile * tile * count;
+        if difference < closest || (difference <= closest && is_filled) {
+            (closest, tiles) = (difference, count);
+        }
+    }
+    tiles
 }
 
 #[cfg(test)]
@@ -251,7 +331,7 @@ mod tests {
             ("Qwen/Qwen3-VL-8B-Instruct", None, 2560, 1440, 3600),
             // 22.5 rows: half to even is 22, not 23.
             ("qwen3-vl-plus", None, 1280, 720, 880),
-            ("qwen3-vl-plus", None, 10, 10, 4),
+            ("qwen3-vl-plus", None, 10, 10, 64),
         ] {
             let counted = image_tokens(model, detail, width, height);
             assert_eq!(counted, Some(tokens), "{model} {width} × {height}");
@@ -259,6 +339,42 @@ mod tests {
         // 1800 × 2400 pixels are reduced to at most 1536 patches: 33 × 44.
         assert_eq!(image_tokens("gpt-4.1-mini", None, 1800, 2400), Some(2353));
         assert_eq!(image_tokens("my-model", None, 640, 480), None);
+    }
+
+    /// Counts by running the image processors of transformers 5.24.0 and mistral-common 1.13.1.
+    #[test]
+    fn counts_match_the_published_image_processors() {
+        let sizes = [
+            (96, 64),
+            (10, 10),
+            (640, 480),
+            (1280, 720),
+            (2560, 1440),
+            (500, 333),
+            (4000, 3000),
+            (30, 1000),
+        ];
+        for (model, counts) in [
+            ("qwen2.5-vl-7b", [6, 4, 391, 1196, 4641, 216, 15301, 36]),
+            ("qwen3-vl-8b", [70, 64, 300, 880, 3600, 160, 11750, 94]),
+            ("qwen3.8-flash", [70, 64, 300, 880, 3600, 160, 11750, 94]),
+            ("glm-4.5v", [12, 9, 391, 1196, 4641, 216, 6030, 36]),
+            ("kimi-k2.5", [12, 1, 414, 1196, 4214, 216, 4200, 72]),
+            ("gemma-4-31b-it", [260, 256, 266, 264, 264, 260, 266, 192]),
+            (
+                "internvl3-8b",
+                [1794, 258, 3330, 2306, 2306, 1794, 3330, 3330],
+            ),
+            ("pixtral-12b", [28, 2, 1230, 2340, 2340, 693, 3120, 189]),
+            (
+                "mistral-small-2603",
+                [15, 2, 432, 1222, 1736, 228, 2352, 108],
+            ),
+        ] {
+            let found =
+                sizes.map(|(width, height)| image_tokens(model, None, width, height).unwrap());
+            assert_eq!(found, counts, "{model}");
+        }
     }
 
     #[test]

@@ -6,11 +6,12 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use super::tier_factors::TierFactors;
 use super::token_bound::TokenBound;
 use crate::error::{Error, Result};
 use crate::files::reading;
-use crate::types::Usage;
 use crate::types::text::TomlFault;
+use crate::types::{ServiceTier, Usage};
 
 /// Price of a model, in US dollars per million tokens.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -26,7 +27,14 @@ pub(crate) struct Price {
     /// Tokens per image; `None` to use the rule of the model's family.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub image_tokens: Option<u64>,
+    /// Factors of the other service tiers; the numbers above are at the tier that is asked for.
+    #[serde(skip)]
+    pub tiers: TierFactors,
 }
+
+/// Ratio of a stated charge to the price of its tokens, or its inverse, up to which the charge is plausible. Chosen: a cache and a batch
+/// make a prompt at most 20 times cheaper, and the dearest provider of a model costs about ten times the cheapest.
+const MAX_RATIO: f64 = 100.0;
 
 impl Price {
     /// Cost of this many prompt and reply tokens, in US dollars.
@@ -42,15 +50,56 @@ impl Price {
         (bound.prompt as f64 * input + bound.reply as f64 * self.output) / 1e6
     }
 
-    /// Cost of a request from its reported usage, in US dollars. A token count that the server did not report counts as 0.
+    /// Charge for a request in US dollars: the charge that the server states, if it is plausible, else the price of its tokens.
     #[must_use]
     pub(crate) fn charged(&self, usage: Usage) -> f64 {
+        self.charged_in_part(usage, 1.0)
+    }
+
+    /// Charge for a request whose tokens cost only a `share` of their price, as in a batch. A stated charge is what was charged in all.
+    #[must_use]
+    pub(crate) fn charged_in_part(&self, usage: Usage, share: f64) -> f64 {
+        let list = share * self.list_charge(usage);
+        stated_charge(usage, list).unwrap_or(list)
+    }
+
+    /// Price of the tokens of a request at its service tier, in US dollars. A token count that the server did not report counts as 0.
+    #[must_use]
+    pub(crate) fn list_charge(&self, usage: Usage) -> f64 {
         let prompt = tokens_or_zero(usage.prompt_tokens);
         let reply = tokens_or_zero(usage.completion_tokens);
         let cached = tokens_or_zero(usage.cached_tokens).min(prompt);
         let discount = self.input - self.cached_input.unwrap_or(self.input);
-        self.cost(prompt, reply) - cached * discount / 1e6
+        let tier = self.tiers.factor(usage.service_tier);
+        tier * (self.cost(prompt, reply) - cached * discount / 1e6)
     }
+
+    /// The same price, as that of the service tier that is asked for, whatever its name.
+    pub(crate) fn as_asked(self, tier: Option<&str>) -> Self {
+        let kind = tier.and_then(ServiceTier::from_name);
+        Self {
+            tiers: self.tiers.relative_to(kind, 1.0),
+            ..self
+        }
+    }
+
+    /// The price at another tier, by its factor.
+    fn times(self, factor: f64) -> Self {
+        Self {
+            input: factor * self.input,
+            output: factor * self.output,
+            cached_input: self.cached_input.map(|cached| factor * cached),
+            ..self
+        }
+    }
+}
+
+/// The charge that the server states for a request whose tokens cost `list`, both in US dollars; `None` if it states none, or one that is
+/// no plausible price of these tokens.
+pub(crate) fn stated_charge(usage: Usage, list: f64) -> Option<f64> {
+    let stated = usage.cost?.dollars();
+    let is_plausible = list <= 0.0 || (list / MAX_RATIO..=list * MAX_RATIO).contains(&stated);
+    is_plausible.then_some(stated)
 }
 
 fn tokens_or_zero(tokens: Option<u64>) -> f64 {
@@ -66,6 +115,12 @@ pub(crate) struct Prices {
     /// Price in the Batch API, as a share of the normal price.
     pub batch: f64,
     models: BTreeMap<String, Price>,
+    /// For models in `models`: versions, as in `gpt-4o-2024-08-06`, that the vendor's list gives no other price.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    versions: BTreeMap<String, Vec<String>>,
+    /// Factors of the price by service tier, and by model in `models`.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    tiers: BTreeMap<String, BTreeMap<String, f64>>,
     /// True for a table from `--prices`.
     #[serde(skip)]
     is_custom: bool,
@@ -99,6 +154,13 @@ impl Prices {
                 [price.input, price.output, cached].map(|number| (name.as_str(), number))
             })
             .chain([("batch", prices.batch)])
+            .chain(
+                prices
+                    .tiers
+                    .values()
+                    .flatten()
+                    .map(|(name, factor)| (name.as_str(), *factor)),
+            )
             .find(|(_, number)| !is_finite_and_not_negative(*number));
         if let Some((name, number)) = first_invalid {
             return Err(invalid_table(
@@ -146,25 +208,128 @@ impl Prices {
         }
     }
 
-    /// Finds the price of a model: by its full name, then by the name after the provider prefix (`openai/gpt-4o`), each first exactly and
-    /// then without a version suffix (`gpt-4o-2024-08-06`).
+    /// Finds the price of a model at the standard tier; `None` if the table does not state it.
     #[must_use]
     pub(crate) fn find(&self, model: &str) -> Option<Price> {
+        self.price(model, None).ok()
+    }
+
+    /// Finds the price of a model at the service tier that is asked for: by its full name, then by the name after the provider prefix
+    /// (`openai/gpt-4o`). A name with a version (`gpt-4o-2024-08-06`) has the price of the name without it only if the table says so.
+    ///
+    /// # Errors
+    /// The reason why the table has no such price.
+    pub(crate) fn price(
+        &self,
+        model: &str,
+        tier: Option<&str>,
+    ) -> std::result::Result<Price, Unpriced> {
         let bare = model.rsplit('/').next().unwrap_or(model);
-        [model, bare].into_iter().find_map(|name| {
-            self.models
-                .get(name)
-                .or_else(|| self.find_unversioned(name))
-                .copied()
+        let mut reason = Unpriced::Model;
+        for name in [model, bare] {
+            let listed = self.models.get_key_value(name);
+            let listed = listed.or_else(|| self.find_versioned(name));
+            if let Some((name, price)) = listed {
+                return self.at_tier(name, *price, tier);
+            }
+            if let Some(alias) = self.alias(name) {
+                reason = Unpriced::Version {
+                    alias: alias.to_owned(),
+                };
+            }
+        }
+        Err(reason)
+    }
+
+    /// The price of a listed model at a service tier.
+    fn at_tier(
+        &self,
+        name: &str,
+        price: Price,
+        tier: Option<&str>,
+    ) -> std::result::Result<Price, Unpriced> {
+        let stated = self
+            .tiers
+            .iter()
+            .filter_map(|(tier, models)| Some((tier.as_str(), *models.get(name)?)));
+        let factors = TierFactors::new(stated.clone());
+        let Some(asked) = tier else {
+            return Ok(Price {
+                tiers: factors,
+                ..price
+            });
+        };
+        let kind = ServiceTier::from_name(asked);
+        let factor = match kind {
+            None | Some(ServiceTier::Standard) => Some(1.0),
+            Some(_) => stated
+                .clone()
+                .find(|(name, _)| name.eq_ignore_ascii_case(asked.trim()))
+                .map(|(_, factor)| factor),
+        };
+        let factor = factor.ok_or_else(|| Unpriced::Tier {
+            tier: asked.to_owned(),
+            listed: name.to_owned(),
+        })?;
+        Ok(Price {
+            tiers: factors.relative_to(kind, factor),
+            ..price.times(factor)
         })
     }
 
-    /// Price of the model whose name is `name` without a version suffix.
-    fn find_unversioned(&self, name: &str) -> Option<&Price> {
+    /// The model that costs the same as `name`, by the list of its versions.
+    fn find_versioned(&self, name: &str) -> Option<(&String, &Price)> {
+        self.models.iter().find(|(model, _)| {
+            let version = version_of(name, model);
+            let versions = self.versions.get(*model);
+            version.is_some_and(|version| {
+                versions.is_some_and(|versions| {
+                    versions
+                        .iter()
+                        .any(|listed| listed == "all" || listed == version)
+                })
+            })
+        })
+    }
+
+    /// The listed model of which `name` is a version.
+    fn alias(&self, name: &str) -> Option<&str> {
         self.models
-            .iter()
-            .find(|(model, _)| name.strip_prefix(model.as_str()).is_some_and(is_version))
-            .map(|(_, price)| price)
+            .keys()
+            .filter(|model| version_of(name, model).is_some())
+            .max_by_key(|model| model.len())
+            .map(String::as_str)
+    }
+}
+
+/// The reason why a table has no price of a model.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Unpriced {
+    /// The model is not in the table.
+    Model,
+    /// The table has the price of `alias`, and does not say that this version costs the same.
+    Version { alias: String },
+    /// The table has no factor for the service tier of the `listed` model.
+    Tier { tier: String, listed: String },
+}
+
+impl Unpriced {
+    /// The reason with the remedy, for a model and a table of this date.
+    pub(crate) fn words(&self, model: &str, as_of: &str) -> String {
+        match self {
+            Self::Model => format!(
+                "the price of {model} is not in the table of {as_of}; add it to your own table and name that with --prices FILE, or set \
+                 price in a file of models"
+            ),
+            Self::Version { alias } => format!(
+                "the table of {as_of} has a price of {alias}, and does not say that {model} costs the same; add {model} to your own table \
+                 and name that with --prices FILE, or set price in a file of models"
+            ),
+            Self::Tier { tier, listed } => format!(
+                "the table of {as_of} has no price of {model} at the service tier {tier:?}; add [tiers.{tier}] with {listed:?} = FACTOR \
+                 to your own table and name that with --prices FILE, or set price in a file of models"
+            ),
+        }
     }
 }
 
@@ -179,20 +344,21 @@ fn is_finite_and_not_negative(number: f64) -> bool {
     number.is_finite() && number >= 0.0
 }
 
-/// True if the suffix of a model name is a version: a date, `latest`, or `preview` with or without a date. `preview-tts` is another model
-/// with another price.
-fn is_version(suffix: &str) -> bool {
-    suffix.strip_prefix(['-', '@']).is_some_and(|version| {
-        let date = version.strip_prefix("preview").unwrap_or(version);
-        version == "latest"
-            || version == "preview"
-            || (date.len() >= 4 && date.chars().all(|c| c.is_ascii_digit() || c == '-'))
-    })
+/// The version in a name that begins with a model's: a date, `latest`, or `preview` with or without a date. `None` for another model:
+/// `preview-tts` has another price.
+fn version_of<'n>(name: &'n str, model: &str) -> Option<&'n str> {
+    let version = name.strip_prefix(model)?.strip_prefix(['-', '@'])?;
+    let date = version.strip_prefix("preview").unwrap_or(version);
+    let is_version = version == "latest"
+        || version == "preview"
+        || (date.len() >= 4 && date.chars().all(|c| c.is_ascii_digit() || c == '-'));
+    is_version.then_some(version)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::types::StatedCost;
 
     #[test]
     fn the_built_in_table_is_complete() {
@@ -224,11 +390,15 @@ mod tests {
             Some(0.15)
         );
         assert_eq!(input_price(&prices, "claude-haiku-4-5-20251001"), Some(1.0));
+        assert_eq!(input_price(&prices, "gpt-4o-2024-05-13"), Some(5.0));
         assert_eq!(
-            input_price(&prices, "gemini-2.5-flash-preview-04-17"),
+            input_price(&prices, "gemini-2.5-flash-preview-09-2025"),
             input_price(&prices, "gemini-2.5-flash")
         );
         for unknown in [
+            "gpt-4o-2031-01-01",
+            "gemini-2.5-flash-preview-04-17",
+            "deepseek-v4-flash-0731",
             "gpt-4o-audio",
             "gpt-3",
             "my-model",
@@ -241,8 +411,7 @@ mod tests {
         let usage = Usage {
             prompt_tokens: Some(1_000_000),
             completion_tokens: Some(100_000),
-            cached_tokens: None,
-            total_tokens: None,
+            ..Usage::default()
         };
         assert!((price.charged(usage) - 3.5).abs() < 1e-12);
         // Half of the prompt is cached and costs half the price. A count of cached tokens above the prompt is capped.
@@ -250,6 +419,72 @@ mod tests {
         assert!((price.charged(with_cached(usage, u64::MAX)) - 2.25).abs() < 1e-12);
         let opus = prices.find("claude-opus-4-8").unwrap();
         assert!((opus.charged(usage) - opus.charged(with_cached(usage, 9))).abs() < 1e-12);
+    }
+
+    #[test]
+    fn prices_follow_the_service_tier() {
+        let prices = Prices::built_in().unwrap();
+        let usage = |service_tier| Usage {
+            prompt_tokens: Some(1_000_000),
+            completion_tokens: Some(100_000),
+            service_tier,
+            ..Usage::default()
+        };
+        let priority = prices.price("gpt-4o", Some("priority")).unwrap();
+        assert!((priority.input - 4.25).abs() < 1e-12);
+        for (asked, answered, dollars) in [
+            (None, None, 3.5),
+            (None, Some(ServiceTier::Priority), 5.95),
+            (None, Some(ServiceTier::Other), 3.5),
+            (Some("priority"), None, 5.95),
+            (Some("priority"), Some(ServiceTier::Priority), 5.95),
+            (Some("priority"), Some(ServiceTier::Standard), 3.5),
+            (Some("auto"), Some(ServiceTier::Priority), 5.95),
+            (Some("default"), None, 3.5),
+        ] {
+            let price = prices.price("gpt-4o", asked).unwrap();
+            let charged = price.charged(usage(answered));
+            assert!(
+                (charged - dollars).abs() < 1e-9,
+                "{asked:?} {answered:?}: {charged}"
+            );
+        }
+        let reason = prices.price("gpt-4o", Some("turbo")).unwrap_err();
+        assert!(matches!(reason, Unpriced::Tier { .. }), "{reason:?}");
+        let reason = prices.price("gpt-4o-2031-01-01", None).unwrap_err();
+        assert_eq!(
+            reason,
+            Unpriced::Version {
+                alias: "gpt-4o".to_owned()
+            }
+        );
+    }
+
+    #[test]
+    fn plausible_stated_charges_count() {
+        let prices = Prices::built_in().unwrap();
+        let price = prices.find("gpt-4o").unwrap();
+        let charged = |dollars: f64, share: f64| {
+            let usage = Usage {
+                prompt_tokens: Some(10_000),
+                completion_tokens: Some(100),
+                cost: StatedCost::from_dollars(dollars),
+                ..Usage::default()
+            };
+            price.charged_in_part(usage, share)
+        };
+        // The tokens cost $0.026.
+        for (stated, share, dollars) in [
+            (0.13, 1.0, 0.13),
+            (0.013, 1.0, 0.013),
+            (0.0, 1.0, 0.026),
+            (2.7, 1.0, 0.026),
+            (0.02, 0.5, 0.02),
+            (0.0, 0.5, 0.013),
+        ] {
+            let found = charged(stated, share);
+            assert!((found - dollars).abs() < 1e-9, "{stated} {share}: {found}");
+        }
     }
 
     fn load_text(path: &Path, text: &str) -> Result<Prices> {

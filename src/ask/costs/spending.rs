@@ -8,6 +8,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tokio::sync::Notify;
 
+use super::charge_ratios::ChargeRatios;
 use super::prices::Price;
 use super::token_bound::TokenBound;
 use crate::types::{LostAttempts, Usage};
@@ -110,6 +111,8 @@ pub(crate) struct PricedRequest {
     pub(crate) bound: TokenBound,
     /// Replies of the model beyond their token limit.
     pub(crate) excess: Arc<ReplyExcess>,
+    /// Charges that the model's server states.
+    pub(crate) charges: Arc<ChargeRatios>,
 }
 
 impl PricedRequest {
@@ -121,9 +124,13 @@ impl PricedRequest {
         }
     }
 
-    /// Maximum cost of the request, in US dollars.
+    /// Maximum cost of the request, in US dollars: at the price table, or as much dearer as the server has charged before.
     pub(crate) fn max_cost(&self) -> f64 {
-        self.price.max_cost(self.current_bound())
+        self.max_cost_within(self.current_bound())
+    }
+
+    fn max_cost_within(&self, bound: TokenBound) -> f64 {
+        self.charges.factor() * self.price.max_cost(bound)
     }
 }
 
@@ -168,6 +175,11 @@ impl Spending {
         self.dollars().spent
     }
 
+    /// Adds a charge for which nothing was reserved, in US dollars.
+    pub(crate) fn add(&self, charged: f64) {
+        self.dollars().spent += charged;
+    }
+
     /// US dollars reserved for requests that have not ended.
     pub(crate) fn reserved(&self) -> f64 {
         self.dollars().reserved
@@ -186,7 +198,7 @@ impl Spending {
     /// Reserves the maximum cost of a request; `None` if the limit does not allow it.
     pub(crate) fn reserve(self: &Arc<Self>, request: PricedRequest) -> Option<Reservation> {
         let bound = request.current_bound();
-        let max_cost = request.price.max_cost(bound);
+        let max_cost = request.max_cost_within(bound);
         let mut dollars = self.dollars();
         if dollars.waiting > 0 || !self.fits(&dollars, max_cost) {
             return None;
@@ -197,7 +209,7 @@ impl Spending {
             spending: Arc::clone(self),
             request,
             attempts: Mutex::new(Attempts {
-                held: Held::Reserved(bound),
+                held: Held::Reserved(bound, max_cost),
                 charged: LostAttempts::default(),
             }),
         })
@@ -228,15 +240,15 @@ struct Attempts {
     charged: LostAttempts,
 }
 
-/// Reservation of a question, by the state of its current request.
+/// Reservation of a question, by the state of its current request: its token bound, and the reserved US dollars.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Held {
     /// No request is in flight or about to be sent.
     Nothing,
     /// The request is not sent yet.
-    Reserved(TokenBound),
+    Reserved(TokenBound, f64),
     /// The request is in flight.
-    Sent(TokenBound),
+    Sent(TokenBound, f64),
 }
 
 impl Reservation {
@@ -255,11 +267,11 @@ impl Reservation {
                     return true;
                 }
                 let bound = self.request.current_bound();
-                let max_cost = self.request.price.max_cost(bound);
+                let max_cost = self.request.max_cost_within(bound);
                 let mut dollars = self.spending.dollars();
                 if self.spending.fits(&dollars, max_cost) {
                     dollars.reserve(max_cost);
-                    attempts.held = Held::Reserved(bound);
+                    attempts.held = Held::Reserved(bound, max_cost);
                     return true;
                 }
                 if dollars.reservations == 0 {
@@ -277,15 +289,15 @@ impl Reservation {
     /// Records that the request is sent, so that it may be charged.
     pub(crate) fn mark_sent(&self) {
         let mut attempts = self.attempts();
-        if let Held::Reserved(bound) = attempts.held {
-            attempts.held = Held::Sent(bound);
+        if let Held::Reserved(bound, dollars) = attempts.held {
+            attempts.held = Held::Sent(bound, dollars);
         }
     }
 
     /// Replaces the reservation of the sent request by its charge.
     pub(crate) fn settle(&self, charge: Charge) {
         let mut attempts = self.attempts();
-        let Held::Sent(bound) = attempts.held else {
+        let Held::Sent(bound, reserved) = attempts.held else {
             return;
         };
         attempts.held = Held::Nothing;
@@ -305,8 +317,9 @@ impl Reservation {
         if reply > limit {
             self.request.excess.record(reply, limit);
         }
-        let charged = price.charged(stated) + price.max_cost(missing);
-        self.release(bound, charged);
+        self.request.charges.record(price, stated, 1.0);
+        let charged = price.charged(stated) + self.request.max_cost_within(missing);
+        self.release(reserved, charged);
     }
 
     /// Ends the reservation, and returns all requests that were or may have been charged, including one in flight.
@@ -315,10 +328,10 @@ impl Reservation {
         self.attempts().charged
     }
 
-    /// Releases the reservation of this bound, and adds `charged` US dollars to the spent sum.
-    fn release(&self, bound: TokenBound, charged: f64) {
+    /// Releases the `reserved` US dollars, and adds `charged` ones to the spent sum.
+    fn release(&self, reserved: f64, charged: f64) {
         let mut dollars = self.spending.dollars();
-        dollars.release(self.request.price.max_cost(bound));
+        dollars.release(reserved);
         dollars.spent += charged;
         drop(dollars);
         self.spending.released.notify_waiters();
@@ -334,8 +347,8 @@ impl Drop for Reservation {
     fn drop(&mut self) {
         self.settle(Charge::Unknown);
         let held = self.attempts().held;
-        if let Held::Reserved(bound) = held {
-            self.release(bound, 0.0);
+        if let Held::Reserved(_, reserved) = held {
+            self.release(reserved, 0.0);
         }
     }
 }
@@ -353,7 +366,9 @@ impl Drop for Waiting<'_> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::tier_factors::TierFactors;
     use super::*;
+    use crate::types::StatedCost;
 
     /// A request that costs up to 100 dollars: a prompt of 10 tokens, and a reply of 90.
     fn request() -> PricedRequest {
@@ -363,12 +378,14 @@ mod tests {
                 output: 1e6,
                 cached_input: None,
                 image_tokens: None,
+                tiers: TierFactors::default(),
             },
             bound: TokenBound {
                 prompt: 10,
                 reply: 90,
             },
             excess: Arc::default(),
+            charges: Arc::default(),
         }
     }
 
@@ -449,6 +466,55 @@ mod tests {
         retried.mark_sent();
         retried.settle(usage(10, 90));
         assert!(!retried.reserve().await, "nothing is left to wait for");
+    }
+
+    /// A reply for which the server states a charge in US dollars, of tokens that cost 15.
+    fn stated(dollars: f64) -> Charge {
+        Charge::Stated(Usage {
+            prompt_tokens: Some(10),
+            completion_tokens: Some(5),
+            cost: StatedCost::from_dollars(dollars),
+            ..Usage::default()
+        })
+    }
+
+    #[test]
+    fn stated_charges_count_and_raise_later_reservations() {
+        let (spending, request) = (spending(), request());
+        let first = spending.reserve(request.clone()).unwrap();
+        first.mark_sent();
+        first.settle(stated(30.0));
+        assert!((spending.spent() - 30.0).abs() < 1e-9);
+        let second = spending.reserve(request.clone()).unwrap();
+        assert!((spending.reserved() - 200.0).abs() < 1e-9);
+        assert!(spending.reserve(request.clone()).is_none());
+        second.mark_sent();
+        // A request without a known charge counts as dear as the others.
+        second.settle(Charge::Unknown);
+        assert!((spending.spent() - 230.0).abs() < 1e-9);
+        assert_eq!(spending.reserved().to_bits(), 0.0_f64.to_bits());
+        assert!(request.charges.differing().is_some());
+    }
+
+    #[test]
+    fn list_prices_stated_change_nothing() {
+        let (spending, request) = (spending(), request());
+        let first = spending.reserve(request.clone()).unwrap();
+        first.mark_sent();
+        first.settle(stated(15.0));
+        let _second = spending.reserve(request.clone()).unwrap();
+        assert!((spending.reserved() - 100.0).abs() < 1e-9);
+        assert_eq!(request.charges.differing(), None);
+    }
+
+    #[test]
+    fn implausible_charges_are_replaced_by_the_price_table() {
+        let (spending, request) = (spending(), request());
+        let first = spending.reserve(request.clone()).unwrap();
+        first.mark_sent();
+        first.settle(stated(0.0));
+        assert!((spending.spent() - 15.0).abs() < 1e-9);
+        assert!(request.charges.implausible().is_some());
     }
 
     #[test]

@@ -22,8 +22,11 @@ impl TokenBound {
 
     /// Returns the bound on the counts that are missing from `usage`; reported counts become 0.
     ///
-    /// Without prompt tokens (absent or 0), the server does not count tokens: 0 reply tokens are then also missing.
+    /// Nothing is missing if the server states what it charges. Without prompt tokens (absent or 0), the server does not count tokens: 0 reply tokens are then also missing.
     pub(crate) fn missing_from(self, usage: Usage) -> Self {
+        if usage.cost.is_some_and(|cost| cost.dollars() > 0.0) {
+            return Self::default();
+        }
         let prompt = usage.prompt_tokens.filter(|tokens| *tokens > 0);
         let reply = match (prompt, usage.completion_tokens) {
             (None, Some(0)) => None,

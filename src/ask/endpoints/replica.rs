@@ -15,7 +15,7 @@ use crate::ask::pace::{Gate, RateLimits, Window, retry_after};
 use crate::ask::requests::Request;
 use crate::ask::secrets::without_secrets;
 use crate::ask::vendors::Vendor;
-use crate::ask::wire::body_usage;
+use crate::ask::wire::{body_usage, cost_in_headers, with_cost};
 use crate::ask::wire_kind::Wire;
 use crate::error::Result;
 use crate::types::{FailureKind, Finish, Reply};
@@ -115,6 +115,7 @@ impl Replica {
             Ok(reply) => return Ok(self.finish_reply(reply, &response, sent)),
             Err(error) => error,
         };
+        let cost = cost_in_headers(&response.headers);
         let mut failed = match reply_error {
             // An error without a code is a temporary failure of the server.
             ReplyError::Api(api_error) => {
@@ -141,7 +142,8 @@ impl Replica {
                         Retry::AfterDelay
                     },
                     finish: finish.map(|word| scrub.line(&word)),
-                    ..AskError::new(FailureKind::Response, message).with_charge(usage)
+                    ..AskError::new(FailureKind::Response, message)
+                        .with_charge(with_cost(usage, cost))
                 }
             }
         };
@@ -158,6 +160,7 @@ impl Replica {
             .record_success(sent, tokens, limits, self.sending.max_wait);
         Reply {
             latency_ms: response.duration.as_millis() as u64,
+            usage: with_cost(reply.usage, cost_in_headers(&response.headers)),
             ..without_secrets(reply, &self.connection.scrub)
         }
     }
@@ -193,9 +196,10 @@ impl Replica {
         } else {
             Retry::AfterDelay
         };
-        failed
-            .lost
-            .add(body_usage(&String::from_utf8_lossy(&response.body)));
+        failed.lost.add(with_cost(
+            body_usage(&String::from_utf8_lossy(&response.body)),
+            cost_in_headers(&response.headers),
+        ));
         failed.may_have_effect = status >= 500 && !is_rejected_unprocessed(status);
         self.pause(status, sent, &mut failed);
         failed

@@ -10,7 +10,7 @@ use super::remote::Remote;
 use super::script::Script;
 use crate::ask::batch;
 use crate::ask::batch_api::BatchServer;
-use crate::ask::costs::{Reservation, image_tokens};
+use crate::ask::costs::{Reservation, image_tokens, scaling_image_tokens};
 use crate::ask::failures::AskError;
 use crate::ask::requests::{Call, Message, Parameters};
 use crate::error::Result;
@@ -109,6 +109,18 @@ impl Model {
     pub fn image_tokens(&self, width: u64, height: u64) -> Option<u64> {
         let Parameters { model, detail, .. } = self.remote()?.parameters();
         image_tokens(model, *detail, width, height)
+    }
+
+    /// Number of tokens of an image of this width and height, in pixels, if the model has more of them for larger images; `None` if it does
+    /// not, or if the number is unknown.
+    pub(crate) fn scaling_image_tokens(&self, width: u64, height: u64) -> Option<u64> {
+        let Parameters { model, detail, .. } = self.remote()?.parameters();
+        scaling_image_tokens(model, *detail, width, height)
+    }
+
+    /// Service tier that requests ask for; `None` if they leave it to the server.
+    pub(crate) fn service_tier(&self) -> Option<&str> {
+        self.remote()?.parameters().extra.service_tier()
     }
 
     /// Maximum number of tokens in a reply; `None` for models without this limit.

@@ -183,6 +183,11 @@ impl ExtraFields {
         object.is_some_and(|object| object.contains_key(field))
     }
 
+    /// Service tier that requests ask for; `None` if they leave it to the server.
+    pub(in crate::ask) fn service_tier(&self) -> Option<&str> {
+        self.body.get("service_tier")?.as_str()
+    }
+
     /// True if a field that limits the tokens of a reply is omitted.
     pub(in crate::ask) fn omits_token_limit(&self) -> bool {
         self.omit

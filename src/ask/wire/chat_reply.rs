@@ -25,7 +25,7 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, ReplyError>
     if let Some(api_error) = api_error {
         return Err(ReplyError::Api(Box::new(api_error)));
     }
-    let usage = usage::read(completion.get("usage"));
+    let usage = usage::in_body(&completion);
     let unreadable = |description| Unreadable::new(description).with_usage(usage);
     let choice = first_choice(&completion).map_err(unreadable)?;
     if let Some(error) = choice.get("error").filter(|error| !error.is_null()) {
@@ -70,7 +70,7 @@ fn parse(text: &str, content_type: &str) -> Result<Value, ReplyError> {
     if stream::is_stream(text, content_type) {
         return stream::assemble(text).map_err(|usage| {
             let description = "an event stream without a complete chat completion";
-            let usage = usage::read(usage.as_ref());
+            let usage = usage::alone(usage);
             Unreadable::new(description).with_usage(usage).into()
         });
     }

@@ -2,6 +2,7 @@
 //!
 //! Retries, rate limits and the removal of keys ([`Endpoint`](super::Endpoint), [`Remote`](super::Remote)) do not depend on the API.
 
+mod charge;
 mod chat_fields;
 mod chat_reply;
 mod chat_request;
@@ -25,7 +26,9 @@ use super::wire_kind::Wire;
 use crate::error::{Error, Result};
 use crate::types::{Reply, Usage};
 
+pub(super) use charge::cost_in_headers;
 pub(super) use refusal::requested_wire;
+pub(super) use usage::with_cost;
 
 impl Wire {
     /// Headers of every request: the key in the header `form`.
@@ -104,7 +107,7 @@ pub(super) fn batch_reply(body: &str) -> Result<Reply, ReplyError> {
 /// Token usage in the body of a reply or an error; `None` without one.
 pub(super) fn body_usage(body: &str) -> Option<Usage> {
     let body = parse(body).ok()?;
-    usage::read(body.get("usage"))
+    usage::in_body(&body)
 }
 
 /// Header with the key, in the form of OpenAI or Azure.

@@ -30,7 +30,7 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, ReplyError>
     if let Some(api_error) = api_error {
         return Err(ReplyError::Api(Box::new(api_error)));
     }
-    let usage = usage::read(response.get("usage"));
+    let usage = usage::in_body(&response);
     let finish = finish(&response, usage)?;
     let items = response
         .get("output")

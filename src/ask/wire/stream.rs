@@ -39,7 +39,7 @@ pub(super) fn assemble(stream: &str) -> Result<Value, Option<Value>> {
         if let Some(error) = error_event(&event) {
             return Ok(error);
         }
-        for field in ["model", "provider", "usage"] {
+        for field in ["model", "provider", "usage", "service_tier"] {
             if let Some(value) = event.get(field).filter(|value| !value.is_null()) {
                 completion.insert(field.to_owned(), value.clone());
             }

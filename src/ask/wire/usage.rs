@@ -1,15 +1,46 @@
 //! Parsing of the token usage that a server reports, in all known shapes: [`read`].
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
-use crate::types::Usage;
+use super::charge;
+use crate::types::{StatedCost, Usage};
+
+/// Parses the `usage` in a body, with the charge and the service tier that the body states. `None` if it states none of them.
+pub(super) fn in_body(body: &Value) -> Option<Usage> {
+    let usage = Usage {
+        cost: charge::cost_in_body(body),
+        service_tier: charge::tier(body),
+        ..read(body.get("usage")).unwrap_or_default()
+    };
+    (usage != Usage::default()).then_some(usage)
+}
+
+/// Adds the charge that the headers of a response state; the higher one counts. Without a usage, a charge of 0 states nothing.
+pub(in crate::ask) fn with_cost(usage: Option<Usage>, cost: Option<StatedCost>) -> Option<Usage> {
+    match (usage, cost) {
+        (Some(usage), cost) => Some(Usage {
+            cost: usage.cost.max(cost),
+            ..usage
+        }),
+        (None, Some(cost)) if cost.dollars() > 0.0 => Some(Usage {
+            cost: Some(cost),
+            ..Usage::default()
+        }),
+        (None, _) => None,
+    }
+}
+
+/// Parses a `usage` that was cut off its body.
+pub(super) fn alone(usage: Option<Value>) -> Option<Usage> {
+    in_body(&json!({"usage": usage?}))
+}
 
 /// Parses the `usage` of chat completions (`prompt_tokens`, `completion_tokens`) or of responses (`input_tokens`, `output_tokens`).
 ///
 /// Some servers charge reasoning tokens without counting them as reply tokens (xAI, Gemini's compatible route). The number of reply
 /// tokens is therefore the maximum of: the reported number; the total minus the prompt; and the reported number plus the reasoning
 /// tokens, if these are more than the reported number and so cannot be part of it. `None` without any number.
-pub(super) fn read(usage: Option<&Value>) -> Option<Usage> {
+fn read(usage: Option<&Value>) -> Option<Usage> {
     let usage = usage?;
     let prompt = first_of(usage, ["prompt_tokens", "input_tokens"]);
     let completion = first_of(usage, ["completion_tokens", "output_tokens"]);
@@ -44,6 +75,7 @@ pub(super) fn read(usage: Option<&Value>) -> Option<Usage> {
         completion_tokens: completion.into_iter().flatten().max(),
         cached_tokens: cached.or(read).filter(|cached| *cached > 0),
         total_tokens: total,
+        ..Usage::default()
     };
     (usage != Usage::default()).then_some(usage)
 }
@@ -163,6 +195,7 @@ mod tests {
             output: 100.0,
             cached_input: None,
             image_tokens: None,
+            tiers: crate::ask::costs::TierFactors::default(),
         };
         for (vendor, usage, [prompt, reply]) in vendors() {
             let read = read(Some(&usage)).unwrap();

@@ -1,10 +1,15 @@
 //! Cost of a run and its limit: [`Budget`].
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use crate::ask::{Price, PricedRequest, ReplyExcess, Reservation, Spending, TokenBound};
+use crate::ask::{
+    ChargeRatios, Price, PricedRequest, ReplyExcess, Reservation, Spending, TokenBound, Unpriced,
+    stated_charge,
+};
 use crate::engine::costs::money::MoneySettings;
 use crate::engine::costs::prompt_bounds::{self, PromptBounds, PromptFacts};
+use crate::engine::costs::stored_costs::StoredCosts;
 use crate::engine::models::ModelUnderTest;
 use crate::error::{Error, Result};
 use crate::images::frames::Source;
@@ -13,7 +18,7 @@ use crate::picture::Scaling;
 use crate::run_reports;
 use crate::store::StoredTrial;
 use crate::types::manifests::RunManifest;
-use crate::types::{ImageFacts, Unstated, Usage, Via};
+use crate::types::{ImageFacts, Usage};
 
 /// Characters of English text per token, by the rule of thumb of every provider.
 const CHARACTERS_PER_TOKEN: f64 = 4.0;
@@ -51,6 +56,8 @@ pub(crate) struct Budget {
     spending: Arc<Spending>,
     /// Number of stored requests without stated tokens, and the upper bound of their cost in US dollars.
     unstated: (u32, f64),
+    /// Number of stored replies by model that were charged more than the price table says.
+    dearer: BTreeMap<String, usize>,
 }
 
 /// Price and bounds of the requests to one model.
@@ -61,6 +68,8 @@ struct ModelBudget {
     prompts: PromptBounds,
     /// Replies beyond the token limit.
     excess: Arc<ReplyExcess>,
+    /// Charges that the server states.
+    charges: Arc<ChargeRatios>,
 }
 
 /// Permission to ask a question now.
@@ -102,43 +111,30 @@ impl Budget {
         run_models: RunModels<'_>,
         stored: &[StoredTrial],
     ) -> Result<Self> {
-        let budgets: Vec<ModelBudget> = models
-            .iter()
-            .map(|model| ModelBudget {
-                price: model.price(&money.prices),
-                prompts: PromptBounds::new(),
-                excess: Arc::default(),
-            })
-            .collect();
-        let unknown = models
-            .iter()
-            .zip(&budgets)
-            .find(|(model, budget)| model.model.is_remote() && budget.price.is_none());
-        if let (Some(_), Some((model, _))) = (money.max_cost, unknown) {
-            return Err(Error::usage(
-                "--max-cost",
-                format_args!(
-                    "the price of {} is not in the table of {}; add it to your own table and name that with --prices FILE, or set price \
-                     in a file of models",
-                    model.name, money.prices.as_of
-                ),
-            ));
+        if money.max_cost.is_some() {
+            for model in models {
+                if let Err(reason) = model.priced(&money.prices) {
+                    let problem = reason.words(model.model.name(), &money.prices.as_of);
+                    return Err(Error::usage("--max-cost", problem));
+                }
+            }
         }
-        let costs = stored.iter().filter_map(|record| {
-            let price = run_models.price(money, &record.model)?;
-            Some(price_factor(money, record.via) * charged(price, record))
-        });
-        let unstated = stored.iter().filter_map(|record| {
-            let price = run_models.price(money, &record.model)?;
-            let unstated = record.lost()?.unstated;
-            let dollars = price_factor(money, record.via) * price.max_cost(bound(unstated));
-            Some((unstated.requests, dollars))
-        });
+        let mut costs = StoredCosts::default();
+        for record in stored {
+            costs.add(run_models.price(money, &record.model), money, record);
+        }
         Ok(Self {
-            unstated: unstated.fold((0, 0.0), |(count, sum), (requests, dollars)| {
-                (u32::saturating_add(count, requests), sum + dollars)
-            }),
-            models: budgets,
+            models: models
+                .iter()
+                .map(|model| ModelBudget {
+                    price: model.price(&money.prices),
+                    prompts: PromptBounds::new(),
+                    excess: Arc::default(),
+                    charges: costs.charges(&model.name),
+                })
+                .collect(),
+            unstated: costs.unstated(),
+            dearer: costs.dearer(),
             spending: Arc::new(Spending::new(money.max_cost, costs.sum())),
         })
     }
@@ -187,10 +183,12 @@ impl Budget {
                 reply: model.model.reply_limit().unwrap_or(UNLIMITED_REPLY),
             },
             excess: Arc::clone(&budget.excess),
+            charges: Arc::clone(&budget.charges),
         })
     }
 
-    /// Corrects the bounds of later prompts by the charged tokens of a trial's prompt.
+    /// Corrects the bounds of later prompts by the charged tokens of a trial's prompt. Adds the stated charge of a model without a price,
+    /// for which nothing is reserved.
     pub(crate) fn observe<'a, I: Item>(
         &mut self,
         model: &ModelUnderTest,
@@ -202,7 +200,13 @@ impl Budget {
         let image_tokens = self.expected_image_tokens(trial.model, model, images);
         let facts = facts(model, trial, &sizes, image_tokens);
         let charged = usage.prompt_tokens.unwrap_or(0);
-        self.models[trial.model].prompts.observe(facts, charged);
+        let budget = &mut self.models[trial.model];
+        budget.prompts.observe(facts, charged);
+        if budget.price.is_none()
+            && let Some(cost) = stated_charge(usage, 0.0)
+        {
+            self.spending.add(cost);
+        }
     }
 
     /// Expected tokens of a trial's prompt: of its text by length, of its images by the rule of the model's family.
@@ -230,12 +234,11 @@ impl Budget {
         })
     }
 
-    /// US dollars spent so far; `None` if no model has a price.
+    /// US dollars spent so far; `None` if no model has a price and no server states a charge.
     pub(crate) fn spent(&self) -> Option<f64> {
-        self.models
-            .iter()
-            .any(|model| model.price.is_some())
-            .then(|| self.spending.spent())
+        let spent = self.spending.spent();
+        let is_known = spent > 0.0 || self.models.iter().any(|model| model.price.is_some());
+        is_known.then_some(spent)
     }
 
     /// US dollars spent so far by all models with a price; zero if no model has one.
@@ -258,34 +261,27 @@ impl Budget {
         &self.models[model].excess
     }
 
-    /// Expected cost of a request to a model, in US dollars; `None` if it has no known price.
+    /// Charges that the server of a model states.
+    pub(crate) fn charges(&self, model: usize) -> &ChargeRatios {
+        &self.models[model].charges
+    }
+
+    /// Number of stored replies by model that were charged more than the price table says.
+    pub(crate) fn dearer(&self) -> &BTreeMap<String, usize> {
+        &self.dearer
+    }
+
+    /// Expected cost of a request to a model, in US dollars, by the price table and the charges so far; `None` if it has no known price.
     pub(crate) fn expected_cost(&self, model: usize, prompt: f64, reply: f64) -> Option<f64> {
-        Some(self.models[model].price?.cost(prompt, reply))
+        let ModelBudget { price, charges, .. } = &self.models[model];
+        Some(charges.mean().unwrap_or(1.0) * (*price)?.cost(prompt, reply))
     }
-}
 
-/// Factor of the price for requests that were sent in this way.
-fn price_factor(money: &MoneySettings, via: Via) -> f64 {
-    match via {
-        Via::Direct | Via::File => 1.0,
-        Via::Batch => money.prices.batch,
-    }
-}
-
-/// Cost of all requests of a stored trial in US dollars; the upper bound for requests without stated tokens.
-fn charged(price: Price, record: &StoredTrial) -> f64 {
-    let reply = record.usage().map_or(0.0, |usage| price.charged(usage));
-    let others = record.lost();
-    reply
-        + others.map_or(0.0, |lost| {
-            price.charged(lost.usage) + price.max_cost(bound(lost.unstated))
-        })
-}
-
-fn bound(unstated: Unstated) -> TokenBound {
-    TokenBound {
-        prompt: unstated.prompt_tokens,
-        reply: unstated.completion_tokens,
+    /// The reason why the price of a model is unknown, if it is another one than that the table does not have the model.
+    pub(crate) fn unpriced(money: &MoneySettings, model: &ModelUnderTest) -> Option<String> {
+        let reason = model.priced(&money.prices).err()?;
+        let is_told = reason != Unpriced::Model;
+        is_told.then(|| reason.words(model.model.name(), &money.prices.as_of))
     }
 }
 

@@ -38,17 +38,22 @@ pub(crate) fn estimate<E: Experiment>(
     let (mut lines, mut all_models) = (Vec::new(), Vec::new());
     let mut built_in = Vec::new();
     let mut loads = Vec::new();
+    for phase in 0..plans.len() {
+        all_models.extend(experiment.models(phase).iter().cloned());
+    }
+    let budget = Budget::new(money, &all_models, stored)?;
+    let mut models_before = 0;
     for (phase, plan) in plans.iter().enumerate() {
         let expected = if phase == 0 { &[] } else { &expected[..] };
         let measured = &measured[phase];
         for (model, line) in cost_lines(experiment, phase, plan, measured, expected) {
             add_load(&mut loads, &experiment.models(phase)[model], &line);
-            lines.push(line);
+            let ratio = budget.charges(models_before + model).mean();
+            lines.push(line.at_ratio(ratio));
         }
         built_in.extend(built_in_models(experiment, phase, plan));
-        all_models.extend(experiment.models(phase).iter().cloned());
+        models_before += experiment.models(phase).len();
     }
-    let budget = Budget::new(money, &all_models, stored)?;
     let sample = match plans.first() {
         Some(plan) => SampledImages::make(experiment, plan, pipeline)?,
         None => SampledImages::default(),
@@ -299,6 +304,7 @@ fn cost_line(
         dollars: tokens.dollars(price, tokens.reply),
         most_dollars: longest.and_then(|longest| tokens.dollars(price, longest)),
         charged_image_tokens: None,
+        charge_ratio: None,
         readings: by_profile
             .iter()
             .filter(|(_, tokens)| tokens.requests > 0)

@@ -9,6 +9,8 @@ mod money;
 pub(crate) mod plan_costs;
 mod planned_images;
 mod prompt_bounds;
+mod stored_costs;
+mod token_check;
 
 pub(crate) use budget::text_tokens;
 pub(super) use budget::{Budget, Permit, RunModels};
@@ -16,3 +18,4 @@ pub(super) use budget_notes::BudgetNotes;
 pub(super) use in_flight_cost::InFlightCost;
 pub(super) use measured_tokens::MeasuredTokens;
 pub(super) use money::{MoneyArgs, MoneySettings};
+pub(super) use token_check::TokenCheck;

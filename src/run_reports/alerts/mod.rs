@@ -42,6 +42,7 @@ pub(super) fn alerts(combined: &Combined, findings: &Findings<'_>) -> Vec<Alert>
     alerts.extend(replies::broken_off_alert(combined));
     alerts.extend(replies::people_alerts(combined));
     alerts.extend(images::image_alerts(combined));
+    alerts.extend(images::shrunk_alerts(combined));
     alerts.extend(parsing::parsing_alerts(combined));
     alerts.extend(confidence::confidence_alerts(
         &combined.runs,

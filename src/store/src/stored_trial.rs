@@ -8,7 +8,7 @@ use serde::{Deserialize, Deserializer};
 use darkqa_ground::types::records::{SmallNumber, Tokens};
 use darkqa_ground::types::{Finish, LostAttempts, Shared, TrialKey, Usage, Via};
 
-/// A trial of a run, without question and answer: 56 bytes.
+/// A trial of a run, without question and answer: 72 bytes.
 #[derive(Debug, Clone, Deserialize)]
 pub struct StoredTrial {
     /// The key of the trial.
@@ -46,7 +46,7 @@ impl StoredTrial {
         self.max_tokens.map(NonZeroU32::get)
     }
 
-    /// The tokens that the server charged; `None` if it did not report them.
+    /// The tokens and the cost that the server charged; `None` if it did not report them.
     pub fn usage(&self) -> Option<Usage> {
         self.usage.usage()
     }
@@ -147,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn a_trial_takes_56_bytes() {
-        assert_eq!(size_of::<StoredTrial>(), 56);
+    fn a_trial_takes_72_bytes() {
+        assert_eq!(size_of::<StoredTrial>(), 72);
     }
 }

@@ -9,4 +9,6 @@ mod pauses;
 mod replicas;
 mod serve;
 mod several_images;
+mod shrunk_images;
+mod stated_costs;
 mod truncated;

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Deserializer};
 
-use crate::types::replies::Usage;
+use crate::types::replies::{ServiceTier, StatedCost, Usage};
 
 /// An optional number in four bytes. Larger numbers become the maximum, 4,294,967,294.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,12 +38,17 @@ impl<'de> Deserialize<'de> for SmallNumber {
     }
 }
 
-/// The tokens that a server charged, as a [`Usage`] in twelve bytes, without the total.
+/// The tokens and the cost that a server charged, as a [`Usage`] in 24 bytes, without the total.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Tokens {
     prompt: SmallNumber,
     completion: SmallNumber,
     cached: SmallNumber,
+    /// Lower and upper half of the cost in units of [`StatedCost`].
+    cost: [u32; 2],
+    /// False if the server stated no cost.
+    has_cost: bool,
+    tier: Option<ServiceTier>,
 }
 
 impl From<Option<Usage>> for Tokens {
@@ -53,6 +58,12 @@ impl From<Option<Usage>> for Tokens {
             prompt: usage.prompt_tokens.into(),
             completion: usage.completion_tokens.into(),
             cached: usage.cached_tokens.into(),
+            cost: {
+                let units = usage.cost.map_or(0, StatedCost::units);
+                [units as u32, (units >> 32) as u32]
+            },
+            has_cost: usage.cost.is_some(),
+            tier: usage.service_tier,
         }
     }
 }
@@ -65,6 +76,11 @@ impl Tokens {
             completion_tokens: self.completion.get(),
             cached_tokens: self.cached.get(),
             total_tokens: None,
+            cost: self.has_cost.then(|| {
+                let [lower, upper] = self.cost.map(u64::from);
+                StatedCost::from_units(upper << 32 | lower)
+            }),
+            service_tier: self.tier,
         };
         (usage != Usage::default()).then_some(usage)
     }
@@ -88,6 +104,8 @@ mod tests {
             completion_tokens: None,
             cached_tokens: Some(0),
             total_tokens: None,
+            cost: StatedCost::from_dollars(7.25),
+            service_tier: Some(ServiceTier::Priority),
         };
         assert_eq!(Tokens::from(Some(usage)).usage(), Some(usage));
         assert_eq!(Tokens::from(None).usage(), None);

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::observed::Observed;
 use super::option_probabilities::TokenChances;
+use super::stated_cost::{ServiceTier, StatedCost};
 
 /// The reason why a model stopped.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -55,6 +56,12 @@ pub struct Usage {
     /// The total as the server stated it; not in the file if it stated none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub total_tokens: Option<u64>,
+    /// The charge as the server stated it, in US dollars; not in the file if it stated none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cost: Option<StatedCost>,
+    /// The service tier as the server stated it; not in the file if it stated none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub service_tier: Option<ServiceTier>,
 }
 
 impl Usage {
@@ -66,7 +73,15 @@ impl Usage {
             .then(|| prompt.unwrap_or(0).saturating_add(completion.unwrap_or(0)))
     }
 
-    /// Adds two usages; a number is unknown if it is unknown in both.
+    /// True if the server stated that it charges for the request: tokens, or a cost.
+    #[must_use]
+    pub fn is_charged(&self) -> bool {
+        let is_cost = self.cost.is_some_and(|cost| cost.dollars() > 0.0);
+        is_cost || self.total().is_some_and(|tokens| tokens > 0)
+    }
+
+    /// Adds two usages; a number is unknown if it is unknown in both. If only one has a cost, the tokens of the other one count at its
+    /// cost per token.
     #[must_use]
     pub fn plus(self, more: Self) -> Self {
         Self {
@@ -74,7 +89,24 @@ impl Usage {
             completion_tokens: sum(self.completion_tokens, more.completion_tokens),
             cached_tokens: sum(self.cached_tokens, more.cached_tokens),
             total_tokens: sum(self.total_tokens, more.total_tokens),
+            cost: match (self.cost, more.cost) {
+                (Some(cost), Some(other)) => Some(cost.plus(other)),
+                (Some(cost), None) => Some(extend(cost, self, more)),
+                (None, Some(cost)) => Some(extend(cost, more, self)),
+                (None, None) => None,
+            },
+            service_tier: self.service_tier.max(more.service_tier),
         }
+    }
+}
+
+/// Cost of the requests of two usages, of which only `priced` has a cost: the same cost per token for both.
+fn extend(cost: StatedCost, priced: Usage, other: Usage) -> StatedCost {
+    let [known, added] = [priced, other].map(|usage| usage.total().unwrap_or(0) as f64);
+    if known > 0.0 {
+        cost.times((known + added) / known)
+    } else {
+        cost
     }
 }
 
@@ -108,7 +140,7 @@ impl LostAttempts {
 
     /// Adds an attempt without a reply; one that was not charged does not count.
     pub fn add(&mut self, usage: Option<Usage>) {
-        if let Some(usage) = usage.filter(|usage| usage.total().is_some_and(|tokens| tokens > 0)) {
+        if let Some(usage) = usage.filter(Usage::is_charged) {
             self.attempts += 1;
             self.usage = self.usage.plus(usage);
         }

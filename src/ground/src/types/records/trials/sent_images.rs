@@ -14,6 +14,8 @@ pub struct SentImages {
     several: Option<Box<(usize, Digest)>>,
     /// The size of all files in bytes.
     pub bytes: u64,
+    /// The width and the height of the first image, in pixels.
+    pub size: [u32; 2],
     /// How dark the photograph of the frame is; only for images of a pair, which are as dark as the photograph.
     pub pair: Option<Box<PairFacts>>,
     /// The frame that was shown, if it differs from that of the question.
@@ -30,6 +32,7 @@ impl SentImages {
             first: first.digest,
             several: all.map(|all| Box::new((count, all))),
             bytes: detail.images().map(|image| image.bytes as u64).sum(),
+            size: [first.width, first.height].map(|side| side as u32),
             pair: first.pair.map(Box::new),
             shown_frame: detail.shown_frame.clone(),
         })

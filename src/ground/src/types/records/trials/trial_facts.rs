@@ -42,8 +42,8 @@ mod tests {
     use crate::types::records::trials::ChoiceFacts;
 
     #[test]
-    fn a_trial_with_choices_takes_60_bytes() {
-        assert_eq!(size_of::<TrialFacts<ChoiceFacts>>(), 60);
+    fn a_trial_with_choices_takes_72_bytes() {
+        assert_eq!(size_of::<TrialFacts<ChoiceFacts>>(), 72);
     }
 
     #[test]
