@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use crate::ask::pace::{protobuf_duration, wait_in_words};
+use crate::ask::pace::{wait_in_field, wait_in_words};
 use crate::ask::replies::bounded_json::{parse, parse_start};
 use crate::types::Usage;
 
@@ -291,25 +291,18 @@ fn details(error: &Value) -> impl Iterator<Item = &Value> {
         .flatten()
 }
 
-/// Longest wait in the fields of an error: Google's `retryDelay`, OpenRouter's `retry_after_seconds` and headers, and
-/// Hugging Face's `estimated_time`.
+/// Longest wait in the fields of an error, of its `metadata` and the headers in it, and of Google's `details`: `retryDelay`,
+/// `retry_after_seconds`, `estimated_time` and others ([`wait_in_field`]).
 fn stated_wait(error: &Value) -> Option<Duration> {
     let metadata = error.get("metadata");
-    let header = metadata
-        .and_then(|metadata| metadata.get("headers")?.as_object())
+    let headers = metadata.and_then(|metadata| metadata.get("headers"));
+    [Some(error), metadata, headers]
         .into_iter()
         .flatten()
-        .find(|(name, _)| name.eq_ignore_ascii_case("retry-after"))
-        .and_then(|(_, value)| text_or_number(value));
-    let field = metadata.and_then(|metadata| text_or_number(metadata.get("retry_after_seconds")?));
-    let estimated = error.get("estimated_time").and_then(text_or_number);
-    let seconds = [header, field, estimated]
-        .into_iter()
+        .chain(details(error))
+        .filter_map(Value::as_object)
         .flatten()
-        .filter_map(|seconds| protobuf_duration(&format!("{seconds}s")));
-    details(error)
-        .filter_map(|detail| protobuf_duration(detail.get("retryDelay")?.as_str()?))
-        .chain(seconds)
+        .filter_map(|(name, value)| wait_in_field(name, &text_or_number(value)?))
         .max()
 }
 
