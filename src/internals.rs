@@ -4,7 +4,7 @@ pub mod ask {
     pub use crate::ask::{
         Access, AskError, BaseUrl, Call, Constrain, Endpoint, ExtraFields, ImageDetail, Message,
         Model, Parameters, Prompts, Query, Quota, Random, Reach, Remote, Script, Secret, Sending,
-        Temperature, Thinking, TokenField, WireSetting,
+        SettingsOrigin, Temperature, Thinking, TokenField, WireSetting,
     };
 }
 

@@ -38,10 +38,10 @@ pub(crate) use pace::ConcurrencyBounds;
 pub use pace::Quota;
 pub use prompts::Prompts;
 pub use requests::{
-    Call, Constrain, ExtraFields, ImageDetail, Message, Parameters, Query, Temperature, Thinking,
-    TokenField,
+    Call, Constrain, ExtraFields, ImageDetail, Message, Parameters, Query, SettingsOrigin,
+    Temperature, Thinking, TokenField,
 };
-pub(crate) use requests::{ImageLimit, ImagePlaces, RequestArgs, by_flag};
+pub(crate) use requests::{ChangedSetting, ImageLimit, ImagePlaces, RequestArgs, by_flag};
 pub use secrets::Secret;
 pub(crate) use secrets::{KeyHeader, is_secret_name, is_secret_value, looks_like_key};
 pub use wire_kind::WireSetting;

@@ -9,13 +9,15 @@ mod keyed;
 mod layers;
 mod no_effect;
 
+use std::collections::BTreeSet;
 use std::ffi::OsString;
 use std::io::Write as _;
 use std::path::Path;
 use std::process::ExitCode;
 
 use anstream::{AutoStream, ColorChoice};
-use clap::FromArgMatches as _;
+use clap::parser::ValueSource;
+use clap::{ArgMatches, FromArgMatches as _};
 use clap_complete::Shell;
 use tracing_subscriber::EnvFilter;
 
@@ -130,9 +132,19 @@ fn to_cli(parsed: &layers::Parsed, words: &[String]) -> Result<Cli> {
     if let Some(job) = job {
         job.image_flags = image_words::typed_flags(own)?;
         job.typed.clone_from(&parsed.typed);
+        job.unset = unset_flags(own);
         job.words = words.to_vec();
     }
     Ok(cli)
+}
+
+/// Long names of the flags that keep their defaults.
+fn unset_flags(own: &ArgMatches) -> BTreeSet<String> {
+    own.ids()
+        .map(clap::Id::as_str)
+        .filter(|id| own.value_source(id) == Some(ValueSource::DefaultValue))
+        .map(|id| id.replace('_', "-"))
+        .collect()
 }
 
 fn carry_out(cli: Cli, progress: &Progress) -> Result<Outcome> {

@@ -250,8 +250,12 @@ impl CircuitBreaker {
         self.stopped |= self.fails_fast && is_newly_stopped;
         self.stopped |= too_many.is_some() || self.models.iter().all(|model| model.health.stopped);
         if let Some(problem) = problem.or(too_many) {
-            let problem =
-                format!("{problem} (replies so far are stored; the same command continues)");
+            let how = if error.forced.is_empty() {
+                "the same command continues"
+            } else {
+                "the same command continues; with another value, --resume DIR does"
+            };
+            let problem = format!("{problem} (replies so far are stored; {how})");
             if is_newly_stopped {
                 let (endpoint, problem) = (endpoint.clone(), problem.clone());
                 self.model_errors

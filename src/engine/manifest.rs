@@ -10,6 +10,7 @@ use crate::engine::settings::JobSettings;
 use crate::error::Result;
 use crate::images::frames::input_summary;
 use crate::images::recipes::image_words::ImageWords;
+use crate::runs::changed_settings::is_kept;
 use crate::runs::renamed::{self, SettingsChange};
 use crate::store::now;
 use crate::types::manifests::{Counts, RunManifest, RunPart, Status};
@@ -33,6 +34,11 @@ pub(crate) fn run_manifest<E: Experiment>(
         .map(|(field, value)| (field.to_owned(), value))
         .collect();
     settings.extend(notes.clone());
+    let kept = stored.iter().flat_map(|stored| &stored.settings);
+    settings.extend(
+        kept.filter(|(key, _)| is_kept(key))
+            .map(|(key, value)| (key.clone(), value.clone())),
+    );
     let mut columns = stored
         .as_ref()
         .map_or_else(Default::default, |stored| stored.columns.clone());

@@ -6,6 +6,7 @@
 
 pub(crate) mod batch;
 pub(crate) mod circuit_breaker;
+pub(crate) mod continuation;
 pub(crate) mod costs;
 pub(crate) mod dark_already;
 pub(crate) mod dispatch;

@@ -14,7 +14,7 @@ mod selection;
 mod settings;
 mod trust;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use serde_json::{Value, json};
@@ -22,6 +22,7 @@ use serde_json::{Value, json};
 use crate::ask::{Endpoint, Model, Parameters, Price, Prices, Remote, Script, Server, Unpriced};
 use crate::error::{Error, Result};
 use crate::images::trials::{Item, Stimulus, Trial};
+use crate::runs::changed_settings::{self, CHANGED_FOR, REFUSED_FOR};
 use crate::runs::renamed::ADAPTED_FOR;
 use crate::types::{Condition, Record, View};
 
@@ -106,7 +107,7 @@ impl ModelUnderTest {
         stimulus: &Stimulus,
     ) -> Record<I::Detail> {
         Record {
-            max_tokens: self.model.raised_limit(),
+            max_tokens: self.model.changed_limit(),
             ..I::blank(trial, stimulus, &self.name)
         }
     }
@@ -245,6 +246,24 @@ pub(crate) fn open(
             "--model",
             "a model that can answer open questions expected",
         )),
+    }
+}
+
+/// Adds to the settings of a manifest which flags of each model the server refused, and which settings changed within the run.
+pub(crate) fn note_changes(models: &[&ModelUnderTest], settings: &mut BTreeMap<String, Value>) {
+    for model in models {
+        let forced = model.model.forced();
+        if !forced.is_empty() {
+            let key = changed_settings::key(REFUSED_FOR, &model.name, model.model.is_judge());
+            let earlier = changed_settings::strings(settings.get(&key));
+            let all: BTreeSet<&str> = earlier.iter().map(String::as_str).chain(forced).collect();
+            settings.insert(key, json!(all));
+        }
+        let changes = model.model.changed_settings();
+        if !changes.is_empty() {
+            let key = changed_settings::key(CHANGED_FOR, &model.name, model.model.is_judge());
+            settings.insert(key, json!(changes));
+        }
     }
 }
 

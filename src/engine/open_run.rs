@@ -110,6 +110,7 @@ impl<E: Experiment> OpenRun<'_, E> {
             let adapted = models::adapted(self.experiment.models(phase));
             self.manifest.settings.extend(adapted);
         }
+        models::note_changes(&every_model(self.experiment), &mut self.manifest.settings);
         self.note_cost()?;
         self.finish(end)
     }
@@ -385,6 +386,7 @@ impl<E: Experiment> OpenRun<'_, E> {
     fn begin(&mut self, counts: TrialCounts, stored: &[StoredTrial]) -> Result<()> {
         let TrialCounts { trials, answered } = counts;
         manifest::mark_started(self.experiment, &mut self.manifest);
+        models::note_changes(&every_model(self.experiment), &mut self.manifest.settings);
         self.manifest.platform.extend(self.enhancers.version());
         self.write_counts(stored)?;
         if answered > 0 {
@@ -543,16 +545,16 @@ pub(crate) fn lost_for_good(stored: &[StoredTrial], settings: &JobSettings) -> H
 
 /// Keys of the trials whose reply was truncated at a lower limit than the current one of their model.
 pub(crate) fn truncated(stored: &[StoredTrial], models: &[ModelUnderTest]) -> HashSet<TrialKey> {
-    let limits: HashMap<&str, u32> = models
+    let limits: HashMap<&str, (u32, u32)> = models
         .iter()
-        .filter_map(|model| Some((&*model.name, model.model.raised_limit()?)))
+        .filter_map(|model| Some((&*model.name, model.model.token_limits()?)))
         .collect();
     stored
         .iter()
         .filter(|trial| {
             limits
                 .get(trial.model.as_str())
-                .is_some_and(|limit| trial.is_truncated_below(*limit))
+                .is_some_and(|&(limit, first)| trial.is_truncated_below(limit, first))
         })
         .map(|trial| trial.key)
         .collect()

@@ -9,7 +9,10 @@ use std::time::Duration;
 use clap::Args;
 use serde_json::Value;
 
-use crate::ask::{AccessArgs, ConcurrencyBounds, Constrain, Parameters, RequestArgs, Sending};
+use crate::ask::{
+    AccessArgs, ConcurrencyBounds, Constrain, Parameters, RequestArgs, Sending, SettingsOrigin,
+};
+use crate::engine::continuation::Continuation;
 use crate::engine::costs::{MoneyArgs, MoneySettings};
 use crate::engine::models::{
     AskSettings, AskingArgs, KeyUse, ModelArgs, ModelName, ResolveContext, TextBaseline,
@@ -26,7 +29,6 @@ use crate::runs::run_plan::RunPlan;
 use crate::runs::shard::Shard;
 use crate::store;
 use crate::types::flags::seconds;
-use crate::types::manifests::Columns;
 use crate::types::{Decides, SetLight, View};
 use darkqa_enhance::{EnhancerArgs, ModelFile};
 use darkqa_light::{LightArgs, LightSettings};
@@ -79,6 +81,9 @@ pub(crate) struct JobArgs {
     /// Long names of the flags on the command line, without flags that variables or files set.
     #[arg(skip)]
     pub typed: BTreeSet<String>,
+    /// Long names of the flags that neither the command line nor a variable or file sets.
+    #[arg(skip)]
+    pub unset: BTreeSet<String>,
     /// Arguments of the command line, without the program name.
     #[arg(skip)]
     pub words: Vec<String>,
@@ -211,9 +216,9 @@ impl JobSettings {
         Ok(files)
     }
 
-    /// Columns in the manifest of an existing run; empty for a new run.
-    pub(crate) fn columns(&self) -> Columns {
-        self.place.for_shard(self.shard).columns()
+    /// The run in the folder of the command; empty for a new run.
+    pub(crate) fn continuation(&self) -> Continuation {
+        self.place.for_shard(self.shard).continuation()
     }
 }
 
@@ -232,7 +237,14 @@ impl JobArgs {
     /// Request settings of models that no models file configures.
     fn request_defaults(&self, experiment: &ExperimentSettings) -> AskingArgs {
         AskingArgs {
-            parameters: self.parameters.clone(),
+            parameters: Parameters {
+                origin: SettingsOrigin {
+                    default_temperature: self.unset.contains("temperature"),
+                    default_seed: self.unset.contains("sampling-seed"),
+                    ..SettingsOrigin::default()
+                },
+                ..self.parameters.clone()
+            },
             request: self.request.clone(),
             access: self.access.clone(),
             sending: self.sending,
@@ -286,7 +298,7 @@ impl JobArgs {
         };
         let mut ask = AskSettings::resolve(&self.models, &defaults, context)?;
         let place = RunPlace::from(self.output.clone()).check_writable()?;
-        ask.continue_from(&place.for_shard(shard).columns());
+        ask.continue_from(&place.for_shard(shard).continuation());
         Ok(JobSettings {
             light: LightSettings::resolve(&self.light, experiment.set_light)?,
             set_light: experiment.set_light,
@@ -346,13 +358,19 @@ impl RunPlace {
         }
     }
 
-    /// Columns in the manifest of the named folder. Empty without a run, or if the manifest cannot be read: opening the folder reports
-    /// that error.
-    fn columns(&self) -> Columns {
-        self.read_or_default(store::read_columns)
+    /// The run in the named folder. Empty without a run, or if the manifest cannot be read: opening the folder reports that error.
+    fn continuation(&self) -> Continuation {
+        Continuation {
+            columns: self.read_or_default(store::read_columns),
+            settings: self.settings(),
+            folder: match self {
+                Self::Named(folder) | Self::Resume(folder) => Some(folder.clone()),
+                Self::Automatic => None,
+            },
+        }
     }
 
-    /// Settings in the manifest of the named folder; empty in the same cases as [`columns`](Self::columns).
+    /// Settings in the manifest of the named folder; empty in the same cases as [`continuation`](Self::continuation).
     fn settings(&self) -> BTreeMap<String, Value> {
         self.read_or_default(store::read_settings)
     }

@@ -3,6 +3,7 @@
 //! [`stored`] reads a run, [`sharded_run`] joins the shards of one, [`record_table`] writes `records.parquet`.
 
 pub(crate) mod batch_system;
+pub(crate) mod changed_settings;
 pub(crate) mod first_source;
 pub(crate) mod image_rebuilder;
 pub(crate) mod mark_index;

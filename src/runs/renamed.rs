@@ -8,6 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::{Value, json};
 
+use super::changed_settings::{CHANGED_FOR, REFUSED_FOR};
 use crate::error::Result;
 use crate::types::manifests::{Fit, RecordedNames, RunManifest, StoredViews, Views};
 use crate::types::replies::OBSERVER;
@@ -83,15 +84,16 @@ pub(crate) fn note_renamed_models(
             .collect();
     }
     // Two models may have swapped names: remove all old entries before inserting new ones.
-    for name in new_names
-        .keys()
-        .filter(|name| stored.settings.contains_key(&adapted_key(name)))
-    {
-        manifest.settings.remove(&adapted_key(name));
+    for key in new_names.keys().flat_map(|name| model_keys(name)) {
+        if stored.settings.contains_key(&key) {
+            manifest.settings.remove(&key);
+        }
     }
     for (name, new) in &new_names {
-        if let Some(changes) = stored.settings.get(&adapted_key(name)) {
-            manifest.settings.insert(adapted_key(new), changes.clone());
+        for (key, new_key) in model_keys(name).into_iter().zip(model_keys(new)) {
+            if let Some(note) = stored.settings.get(&key) {
+                manifest.settings.insert(new_key, note.clone());
+            }
         }
     }
     if settings == SettingsChange::Allowed || stored_views.is_complete() {
@@ -109,8 +111,9 @@ pub(crate) fn note_renamed_models(
     Ok(())
 }
 
-fn adapted_key(name: &str) -> String {
-    format!("{ADAPTED_FOR}{name}")
+/// Keys of the manifest settings about a model.
+fn model_keys(name: &str) -> [String; 3] {
+    [ADAPTED_FOR, CHANGED_FOR, REFUSED_FOR].map(|prefix| format!("{prefix}{name}"))
 }
 
 /// New name of each renamed model.

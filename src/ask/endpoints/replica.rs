@@ -119,7 +119,9 @@ impl Replica {
         let mut failed = match reply_error {
             // An error without a code is a temporary failure of the server.
             ReplyError::Api(api_error) => {
-                let code = api_error.status().unwrap_or(500);
+                let code = api_error
+                    .status()
+                    .unwrap_or_else(|| api_error.likely_status());
                 self.refusal(code, &api_error, &response, request, sent)
             }
             ReplyError::Unreadable(unreadable) => {
@@ -174,7 +176,16 @@ impl Replica {
         request: &Request<'_>,
         sent: Instant,
     ) -> AskError {
+        let now = SystemTime::now();
+        let api_error = &mut api_error.clone();
+        api_error.wait = retry_after(&response.headers, now).max(api_error.wait);
+        let api_error = &*api_error;
         let mut failed = AskError::refused(status, api_error, request.wire, request.sent);
+        // A limit of requests is one, whatever the status.
+        let pace_status = match failed.failure.kind {
+            FailureKind::RateLimit => 429,
+            _ => status,
+        };
         let is_retryable = match response.header("x-should-retry") {
             "true" => true,
             "false" => false,
@@ -182,13 +193,12 @@ impl Replica {
         };
         failed.failure.message = self.refusal_message(response, api_error, &failed.failure.message);
         failed.failure.status = Some(status);
-        let now = SystemTime::now();
-        let mut wait = retry_after(&response.headers, now).max(api_error.wait);
-        if wait.is_none() && status == 429 {
+        let mut wait = api_error.wait;
+        if wait.is_none() && pace_status == 429 {
             wait = RateLimits::read(&response.headers, now).pause();
         }
         failed.wait = wait.filter(|_| is_retryable);
-        let is_full = status == 429 || (asks_for_pause(status) && failed.wait.is_some());
+        let is_full = pace_status == 429 || (asks_for_pause(pace_status) && failed.wait.is_some());
         failed.retry = if !is_retryable {
             Retry::Never
         } else if is_full {
@@ -201,7 +211,7 @@ impl Replica {
             cost_in_headers(&response.headers),
         ));
         failed.may_have_effect = status >= 500 && !is_rejected_unprocessed(status);
-        self.pause(status, sent, &mut failed);
+        self.pause(pace_status, sent, &mut failed);
         failed
     }
 
@@ -224,6 +234,7 @@ impl Replica {
         if !text.is_empty() {
             message = format!("{message}: {text}");
         }
+        let remedy = self.connection.scrub.line(remedy);
         if !remedy.is_empty() {
             message = format!("{message} ({remedy})");
         }

@@ -1,10 +1,13 @@
 //! Errors in the responses of servers, in all known JSON shapes: [`ApiError`].
 
+use std::sync::LazyLock;
 use std::time::Duration;
 
+use regex::Regex;
 use serde_json::Value;
 
-use crate::ask::pace::{protobuf_duration, wait_in_words};
+use super::vocabulary;
+use crate::ask::pace::{wait_in_field, wait_in_words};
 use crate::ask::replies::bounded_json::{parse, parse_start};
 use crate::types::Usage;
 
@@ -27,6 +30,10 @@ pub(in crate::ask) struct ApiError {
     limits: Vec<String>,
     /// Google's names of the cause, such as `API_KEY_INVALID`.
     reasons: Vec<String>,
+    /// True if a stated limit is 0: there is no quota at all.
+    pub(super) has_zero_limit: bool,
+    /// Start of the body in lower case, if it is an HTML page: a gateway, firewall or web site sent it, not the API.
+    pub(super) page: Option<String>,
 }
 
 /// Maximum depth of errors nested in errors: routers embed the error of a server as text.
@@ -34,6 +41,39 @@ const MAX_DEPTH: usize = 3;
 
 /// Maximum length of a message, in bytes; chosen: it is searched for many phrases, and its first line is printed.
 const MAX_MESSAGE: usize = 64 << 10;
+
+/// Maximum length of the start of an HTML page that is searched for phrases, in bytes; chosen.
+const MAX_PAGE: usize = 16 << 10;
+
+/// Names of the text of an error, in the order in which they are searched.
+const TEXT_FIELDS: [&str; 10] = [
+    "message",
+    "detail",
+    "error",
+    "title",
+    "msg",
+    "error_msg",
+    "error_message",
+    "errorMessage",
+    "error_description",
+    "Message",
+];
+
+/// Names of the code of an error, in the order in which they are searched.
+const CODE_FIELDS: [&str; 6] = [
+    "code",
+    "status",
+    "error_code",
+    "errorCode",
+    "statusCode",
+    "__type",
+];
+
+/// Matches a limit of 0 in a text, such as Gemini's `limit: 0`, but not `limit: 0.5`.
+static ZERO_LIMIT: LazyLock<Regex> = LazyLock::new(|| {
+    Regex::new(r"(?i)\b(?:limit|quota)(?: value)?(?:\s*[:=]\s*|\s+(?:is|of)\s+|\s+)0(?:[,;)\s]|\.(?:\D|$)|$)")
+        .unwrap_or_else(|e| unreachable!("a test compiles it: {e}"))
+});
 
 /// Phrases in the text or the id of a limit that resets once a day.
 const DAILY: [&str; 6] = ["(rpd)", "(tpd)", "perday", "per day", "per-day", "daily"];
@@ -98,6 +138,8 @@ impl ApiError {
             wait: inner.wait.max(outer.wait),
             limits: [inner.limits, outer.limits].concat(),
             reasons: [inner.reasons, outer.reasons].concat(),
+            has_zero_limit: inner.has_zero_limit || outer.has_zero_limit,
+            page: None,
             message: inner.message,
         }
     }
@@ -106,11 +148,7 @@ impl ApiError {
     fn flat(error: &Value) -> Self {
         let metadata = error.get("metadata");
         let mut message = text(error)
-            .or_else(|| {
-                ["message", "detail", "error", "title"]
-                    .iter()
-                    .find_map(|f| text(error.get(f)?))
-            })
+            .or_else(|| TEXT_FIELDS.iter().find_map(|field| text(error.get(field)?)))
             .unwrap_or_else(|| error.to_string());
         // OpenRouter adds the text of the provider.
         if let Some(raw) = metadata.and_then(|metadata| text(metadata.get("raw")?)) {
@@ -118,13 +156,16 @@ impl ApiError {
         }
         let message = truncated(message);
         Self {
-            kind: field(error, "type"),
-            code: field(error, "code").or_else(|| field(error, "status")),
+            kind: field(error, "type").or_else(|| field(error, "error_type")),
+            code: CODE_FIELDS.iter().find_map(|name| field(error, name)),
             param: field(error, "param").or_else(|| error_location(error)),
             is_moderated: metadata.is_some_and(|metadata| {
                 metadata.get("reasons").is_some() || metadata.get("flagged_input").is_some()
             }),
             wait: wait_in_words(&message).max(stated_wait(error)),
+            has_zero_limit: ZERO_LIMIT.is_match(&message)
+                || quota_values(error).any(|value| value == "0"),
+            page: None,
             limits: quota_ids(error),
             reasons: details(error)
                 .filter_map(|detail| text_or_number(detail.get("reason")?))
@@ -146,13 +187,28 @@ impl ApiError {
     /// Parses the body of a refused request: JSON, an HTML page or plain text.
     pub(in crate::ask) fn from_body(body: &str) -> Self {
         let parsed = parse(body).ok();
-        parsed
+        if let Some(found) = parsed.as_ref().and_then(Self::from_json) {
+            return found;
+        }
+        let has_text = |body: &Value| {
+            TEXT_FIELDS
+                .iter()
+                .any(|field| body.get(field).is_some_and(is_filled))
+        };
+        if let Some(found) = parsed.filter(has_text) {
+            return Self::from_error(&found);
+        }
+        let title = page_title(body);
+        let page = title
             .as_ref()
-            .and_then(Self::from_json)
-            .unwrap_or_else(|| Self {
-                message: page_title(body).unwrap_or_else(|| truncated(body.trim().to_owned())),
-                ..Self::default()
-            })
+            .map(|_| body[..body.floor_char_boundary(MAX_PAGE)].to_lowercase());
+        let message = title.unwrap_or_else(|| truncated(body.trim().to_owned()));
+        Self {
+            wait: wait_in_words(&message),
+            message,
+            page,
+            ..Self::default()
+        }
     }
 
     /// True if the code or the kind is one of these.
@@ -169,6 +225,35 @@ impl ApiError {
         phrases.iter().any(|phrase| message.contains(phrase))
     }
 
+    /// True if the message contains a name that is not part of a longer word, ignoring case.
+    pub(super) fn names(&self, name: &str) -> bool {
+        let (message, name) = (self.message.to_lowercase(), name.to_lowercase());
+        message.match_indices(&name).any(|(start, found)| {
+            let before = message[..start].chars().next_back();
+            let after = message[start + found.len()..].chars().next();
+            ![before, after]
+                .into_iter()
+                .flatten()
+                .any(char::is_alphanumeric)
+        })
+    }
+
+    /// True if the code, the kind or a cause contains one of these words; case and separators are ignored: `insufficientquota` is in
+    /// `Insufficient_Quota`.
+    pub(super) fn has_code_like(&self, words: &[&str]) -> bool {
+        [&self.code, &self.kind]
+            .into_iter()
+            .flatten()
+            .chain(&self.reasons)
+            .map(|code| {
+                code.chars()
+                    .filter(char::is_ascii_alphanumeric)
+                    .map(|c| c.to_ascii_lowercase())
+                    .collect::<String>()
+            })
+            .any(|code| words.iter().any(|word| code.contains(word)))
+    }
+
     /// Code, kind, causes and message, in lower case.
     pub(super) fn lower_case_texts(&self) -> Vec<String> {
         [&self.code, &self.kind]
@@ -178,6 +263,21 @@ impl ApiError {
             .chain([&self.message])
             .map(|text| text.to_lowercase())
             .collect()
+    }
+
+    /// The HTTP status that fits the words of an error in a response with a success status and without a code; 500 if none does.
+    pub(in crate::ask) fn likely_status(&self) -> u16 {
+        let is_credit =
+            self.has_code_like(&vocabulary::CREDIT_CODES) || self.mentions_any(&vocabulary::CREDIT);
+        if is_credit {
+            402
+        } else if self.mentions_any(&vocabulary::RATE) {
+            429
+        } else if self.mentions_any(&vocabulary::WRONG_KEY) {
+            401
+        } else {
+            500
+        }
     }
 
     /// The error code as an HTTP status; `None` unless it is a number from 400 to 599.
@@ -291,35 +391,38 @@ fn details(error: &Value) -> impl Iterator<Item = &Value> {
         .flatten()
 }
 
-/// Longest wait in the fields of an error: Google's `retryDelay`, OpenRouter's `retry_after_seconds` and headers, and
-/// Hugging Face's `estimated_time`.
+/// Longest wait in the fields of an error, of its `metadata` and the headers in it, and of Google's `details`: `retryDelay`,
+/// `retry_after_seconds`, `estimated_time` and others ([`wait_in_field`]).
 fn stated_wait(error: &Value) -> Option<Duration> {
     let metadata = error.get("metadata");
-    let header = metadata
-        .and_then(|metadata| metadata.get("headers")?.as_object())
+    let headers = metadata.and_then(|metadata| metadata.get("headers"));
+    [Some(error), metadata, headers]
         .into_iter()
         .flatten()
-        .find(|(name, _)| name.eq_ignore_ascii_case("retry-after"))
-        .and_then(|(_, value)| text_or_number(value));
-    let field = metadata.and_then(|metadata| text_or_number(metadata.get("retry_after_seconds")?));
-    let estimated = error.get("estimated_time").and_then(text_or_number);
-    let seconds = [header, field, estimated]
-        .into_iter()
+        .chain(details(error))
+        .filter_map(Value::as_object)
         .flatten()
-        .filter_map(|seconds| protobuf_duration(&format!("{seconds}s")));
-    details(error)
-        .filter_map(|detail| protobuf_duration(detail.get("retryDelay")?.as_str()?))
-        .chain(seconds)
+        .filter_map(|(name, value)| wait_in_field(name, &text_or_number(value)?))
         .max()
+}
+
+/// Violated limits in Google's `details`.
+fn violations(error: &Value) -> impl Iterator<Item = &Value> {
+    details(error)
+        .filter_map(|detail| detail.get("violations")?.as_array())
+        .flatten()
 }
 
 /// Ids of the limits in Google's `details`.
 fn quota_ids(error: &Value) -> Vec<String> {
-    details(error)
-        .filter_map(|detail| detail.get("violations")?.as_array())
-        .flatten()
+    violations(error)
         .filter_map(|violation| text_or_number(violation.get("quotaId")?))
         .collect()
+}
+
+/// Values of the limits in Google's `details`.
+fn quota_values(error: &Value) -> impl Iterator<Item = String> {
+    violations(error).filter_map(|violation| text_or_number(violation.get("quotaValue")?))
 }
 
 /// True for a value with content: not null, false or empty.
@@ -333,19 +436,36 @@ fn is_filled(value: &Value) -> bool {
     }
 }
 
-/// A string with content, or the joined messages of a list of errors, as FastAPI sends them.
+/// A string with content, or the joined messages of a list of errors, each with its place, as FastAPI sends them.
 fn text(value: &Value) -> Option<String> {
     match value {
         Value::String(text) if !text.trim().is_empty() => Some(text.clone()),
         Value::Array(items) => {
             let texts: Vec<String> = items
                 .iter()
-                .filter_map(|item| text(item).or_else(|| text(item.get("msg")?)))
+                .filter_map(|item| text(item).or_else(|| located_text(item)))
                 .collect();
             (!texts.is_empty()).then(|| texts.join("; "))
         }
         _ => None,
     }
+}
+
+/// Message of an item of FastAPI's list of errors, after the place in the request that it is about: `seed: Extra inputs are not permitted`.
+fn located_text(item: &Value) -> Option<String> {
+    let message = text(item.get("msg")?)?;
+    let place: Vec<String> = item
+        .get("loc")
+        .and_then(Value::as_array)
+        .into_iter()
+        .flatten()
+        .filter_map(text_or_number)
+        .filter(|part| part != "body")
+        .collect();
+    Some(match place.join(".") {
+        place if place.is_empty() => message,
+        place => format!("{place}: {message}"),
+    })
 }
 
 /// A string or a number, as text.
@@ -358,155 +478,4 @@ fn text_or_number(value: &Value) -> Option<String> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn errors_of_every_shape_are_parsed() {
-        for (body, message, code) in [
-            (
-                r#"{"error":{"message":"m","type":"t","code":"c"}}"#,
-                "m",
-                Some("c"),
-            ),
-            (r#"{"error":{"message":"m","code":502}}"#, "m", Some("502")),
-            (r#"{"error":"m"}"#, "m", None),
-            (
-                r#"{"object":"error","message":"m","code":400}"#,
-                "m",
-                Some("400"),
-            ),
-            (r#"{"detail":"m"}"#, "m", None),
-            (
-                r#"{"detail":[{"loc":["body"],"msg":"m"},{"msg":"n"}]}"#,
-                "m; n",
-                None,
-            ),
-            (
-                r#"{"type":"error","error":{"type":"overloaded_error","message":"m"}}"#,
-                "m",
-                None,
-            ),
-            (
-                r#"{"type":"about:blank","title":"m","status":422}"#,
-                "m",
-                Some("422"),
-            ),
-            (
-                r#"{"error":{"message":"m","metadata":{"raw":"r"}}}"#,
-                "m: r",
-                None,
-            ),
-            (r#"{"error":{"odd":1}}"#, r#"{"odd":1}"#, None),
-            (
-                "<html><head><TITLE> 413 Too Large </TITLE>é",
-                "an HTML page titled \"413 Too Large\"",
-                None,
-            ),
-            ("\n<!DOCTYPE html><p>", "an HTML page without a title", None),
-            (" upstream\n", "upstream", None),
-            ("", "", None),
-        ] {
-            let api_error = ApiError::from_body(body);
-            assert_eq!(api_error.message, message, "{body}");
-            assert_eq!(api_error.code.as_deref(), code, "{body}");
-        }
-    }
-
-    #[test]
-    fn nested_errors_are_parsed() {
-        for (body, message, code, param) in [
-            (
-                r#"[{"error":{"message":"m","code":429}}]"#,
-                "m",
-                Some("429"),
-                None,
-            ),
-            (
-                r#"{"object":"error","message":{"detail":[{"type":"extra_forbidden","loc":["body","max_completion_tokens"],"msg":"Extra inputs are not permitted"}]}}"#,
-                "Extra inputs are not permitted",
-                None,
-                Some("max_completion_tokens"),
-            ),
-            (
-                r#"{"error":{"message":"litellm.BadRequestError: {\"error\":{\"message\":\"deep\",\"param\":\"temperature\"}}","code":"400"}}"#,
-                "deep",
-                Some("400"),
-                Some("temperature"),
-            ),
-            (
-                r#"{"detail":[{"loc":["body","logprobs"],"msg":"m"}]}"#,
-                "m",
-                None,
-                Some("logprobs"),
-            ),
-            // Five levels: the fourth remains JSON text.
-            (
-                r#"{"error":{"message":{"message":{"message":{"message":{"message":"x"}}}}}}"#,
-                r#"{"message":{"message":"x"}}"#,
-                None,
-                None,
-            ),
-            // A JSON object that is not an error remains part of the message.
-            (
-                r#"{"error":{"message":"use {\"a\": 1}"}}"#,
-                r#"use {"a": 1}"#,
-                None,
-                None,
-            ),
-        ] {
-            let api_error = ApiError::from_body(body);
-            assert_eq!(api_error.message, message, "{body}");
-            assert_eq!(api_error.code.as_deref(), code, "{body}");
-            assert_eq!(api_error.param.as_deref(), param, "{body}");
-        }
-    }
-
-    fn gemini(id: &str) -> String {
-        format!(
-            r#"[{{"error":{{"code":429,"message":"You exceeded your current quota.","details":[{{"violations":[{{"quotaId":"{id}"}}]}},{{"@type":"type.googleapis.com/google.rpc.RetryInfo","retryDelay":"45.837906927s"}}]}}}}]"#
-        )
-    }
-
-    #[test]
-    fn waits_and_daily_limits_are_parsed() {
-        for (body, seconds, is_daily) in [
-            (gemini("GenerateRequestsPerMinutePerProject"), Some(45.837_906_927), false),
-            (gemini("GenerateRequestsPerDayPerProject"), Some(45.837_906_927), true),
-            (
-                r#"{"error":{"message":"m","metadata":{"retry_after_seconds":7,"headers":{"RETRY-AFTER":"9"}}}}"#.to_owned(),
-                Some(9.0),
-                false,
-            ),
-            (r#"{"error":"loading","estimated_time":20.5}"#.to_owned(), Some(20.5), false),
-            (
-                r#"{"error":{"message":"Rate limit reached on requests per day (RPD): Limit 200. Please try again in 7m12s."}}"#.to_owned(),
-                Some(432.0),
-                true,
-            ),
-            (r#"{"error":{"message":"slow down"}}"#.to_owned(), None, false),
-        ] {
-            let api_error = ApiError::from_body(&body);
-            let wait = api_error.wait.map(|wait| wait.as_secs_f64());
-            assert_eq!(wait, seconds, "{body}");
-            assert_eq!(api_error.is_daily(), is_daily, "{body}");
-        }
-    }
-
-    #[test]
-    fn a_body_without_an_error_has_none() {
-        for body in [
-            r#"{"choices":[],"error":null}"#,
-            r#"{"choices":[],"error":""}"#,
-            r#"{"error":{},"message":""}"#,
-            r"{}",
-            r"[]",
-        ] {
-            assert_eq!(
-                ApiError::from_json(&serde_json::from_str(body).unwrap()),
-                None,
-                "{body}"
-            );
-        }
-    }
-}
+mod tests;

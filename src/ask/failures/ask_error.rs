@@ -45,6 +45,8 @@ pub struct AskError {
     pub reach: Reach,
     /// Field that the server refused, if the program can send it in another way.
     pub refused_field: Option<AdaptableField>,
+    /// Flags of the settings that the server refused: they may change within the run.
+    pub(crate) forced: &'static [&'static str],
     /// Attempts that were charged.
     pub lost: Box<LostAttempts>,
     /// Finish reason of the server, if it is the reason for the missing reply.
@@ -72,6 +74,7 @@ impl AskError {
             attempts: 1,
             reach: Reach::Trial,
             refused_field: None,
+            forced: &[],
             lost: Box::default(),
             finish: None,
             retry: Retry::Never,

@@ -4,6 +4,7 @@ mod api_error;
 mod ask_error;
 mod quota_refusal;
 mod refused;
+mod vocabulary;
 mod wording;
 
 pub(super) use api_error::{ApiError, ReplyError, Unreadable, page_title};

@@ -12,7 +12,7 @@ use crate::ask::batch;
 use crate::ask::batch_api::BatchServer;
 use crate::ask::costs::{Reservation, image_tokens, scaling_image_tokens};
 use crate::ask::failures::AskError;
-use crate::ask::requests::{Call, Message, Parameters};
+use crate::ask::requests::{Call, ChangedSetting, Message, Parameters};
 use crate::error::Result;
 use crate::types::{Digest, Reply};
 
@@ -142,9 +142,33 @@ impl Model {
             .map_or(0, String::len)
     }
 
-    /// Token limit of replies, if it was raised after the run began.
-    pub(crate) fn raised_limit(&self) -> Option<u32> {
-        self.remote()?.parameters().raised_limit()
+    /// Token limit of replies, if the run began with another one.
+    pub(crate) fn changed_limit(&self) -> Option<u32> {
+        self.remote()?.parameters().changed_limit()
+    }
+
+    /// Token limits of replies: the current one, and the one with which the run began. `None` if none is sent.
+    pub(crate) fn token_limits(&self) -> Option<(u32, u32)> {
+        let parameters = self.remote()?.parameters();
+        Some((parameters.limit()?, parameters.first_limit()))
+    }
+
+    /// Settings that changed within the run; empty if none did.
+    pub(crate) fn changed_settings(&self) -> &[ChangedSetting] {
+        self.remote()
+            .and_then(|model| model.parameters().origin.continued.as_ref())
+            .map_or(&[], |continued| &continued.changes)
+    }
+
+    /// Flags of the settings that the server refused: they may change within the run.
+    pub(crate) fn forced(&self) -> Vec<&'static str> {
+        self.remote().map_or_else(Vec::new, Remote::forced)
+    }
+
+    /// True for the judge of open answers.
+    pub(crate) fn is_judge(&self) -> bool {
+        self.remote()
+            .is_some_and(|model| model.parameters().origin.is_judge)
     }
 
     /// Body of a request as it would be sent now; `None` for built-in models.

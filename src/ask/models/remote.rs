@@ -1,5 +1,6 @@
 //! Model at an endpoint: [`Remote`].
 
+use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -32,6 +33,8 @@ pub struct Remote {
     initial: RequestFields,
     /// Fields of the next request: adapted to all refusals so far.
     fields: Mutex<RequestFields>,
+    /// Flags of the settings that the server refused.
+    forced: Mutex<BTreeSet<&'static str>>,
     /// Outcome of the first question. The other questions wait for it, so that a refusal that concerns all requests costs a single one.
     first_question: tokio::sync::Mutex<FirstQuestion>,
     /// True after the warning about a reply that does not follow the constraint.
@@ -65,6 +68,7 @@ impl Remote {
             headers: endpoint.headers(parameters.wire.initial())?,
             fields: Mutex::new(initial),
             initial,
+            forced: Mutex::default(),
             index: endpoint.add_model(&parameters.model),
             endpoint,
             parameters,
@@ -122,6 +126,13 @@ impl Remote {
     #[must_use]
     pub fn adapted(&self) -> Vec<String> {
         self.fields().changes(self.initial)
+    }
+
+    /// Flags of the settings that the server refused: they may change within the run.
+    #[must_use]
+    pub(crate) fn forced(&self) -> Vec<&'static str> {
+        let forced = self.forced.lock().unwrap_or_else(PoisonError::into_inner);
+        forced.iter().copied().collect()
     }
 
     /// API and all parameters that can change a reply.
@@ -186,7 +197,12 @@ impl Remote {
         let (mut attempts, mut lost) = (0, LostAttempts::default());
         loop {
             let fields = self.fields();
-            match self.ask_with(fields, message, choices, reservation).await {
+            let outcome = self.ask_with(fields, message, choices, reservation).await;
+            if let Err(error) = &outcome {
+                let mut forced = self.forced.lock().unwrap_or_else(PoisonError::into_inner);
+                forced.extend(error.forced);
+            }
+            match outcome {
                 Err(error) if self.adapt(fields, error.refused_field) => {
                     attempts += error.attempts;
                     lost = lost.plus(*error.lost);

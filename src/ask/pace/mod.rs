@@ -14,8 +14,8 @@ mod window;
 
 pub(super) use gate::Gate;
 pub(super) use rate_limits::RateLimits;
-pub(super) use retry_after::{protobuf_duration, retry_after};
-pub(super) use wait_words::wait_in_words;
+pub(super) use retry_after::retry_after;
+pub(super) use wait_words::{wait_in_field, wait_in_words};
 pub(super) use window::Window;
 
 pub use quota::Quota;

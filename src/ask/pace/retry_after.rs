@@ -30,11 +30,6 @@ fn parse_date(text: &str) -> Option<SystemTime> {
     httpdate::parse_http_date(text.trim()).ok()
 }
 
-/// Parses a duration in Protobuf's JSON form, such as `45.837906927s`.
-pub(in crate::ask) fn protobuf_duration(text: &str) -> Option<Duration> {
-    parse_duration(text.trim().strip_suffix('s')?, 1.0)
-}
-
 /// Parses a positive number of units of `unit` seconds; values beyond [`Duration::MAX`] are cut to it.
 fn parse_duration(text: &str, unit: f64) -> Option<Duration> {
     let seconds = text.trim().parse::<f64>().ok()? * unit;

@@ -3,7 +3,7 @@
 
 use serde_json::{Map, Value};
 
-use super::parameters::{Parameters, Temperature};
+use super::parameters::{Constrain, Parameters, Temperature};
 use super::thinking::ThinkingSwitch;
 use super::token_field::TokenField;
 use crate::ask::endpoints::BaseUrl;
@@ -17,8 +17,13 @@ use crate::error::{Error, Result};
 pub enum AdaptableField {
     /// Token limit, which has two names.
     TokenField,
-    /// Temperature; some models accept only their default.
-    Temperature,
+    /// Temperature; some models accept only their default, or only positive ones.
+    Temperature {
+        /// Least temperature that the server accepts, in hundredths; `None` if it accepts only its own or states none.
+        least: Option<u16>,
+    },
+    /// Seed of the sampling; many servers have none.
+    Seed,
     /// API, to the one that the server asks for.
     Wire(Wire),
     /// Request for token counts in a stream.
@@ -38,6 +43,8 @@ pub(in crate::ask) struct RequestFields {
     pub(in crate::ask) token_field: TokenField,
     /// Temperature; `None` to send none.
     pub(in crate::ask) temperature: Option<f64>,
+    /// Seed of the sampling; `None` to send none.
+    pub(in crate::ask) seed: Option<u64>,
     /// True to request token counts in a stream.
     pub(in crate::ask) stream_usage: bool,
     /// Number of top tokens whose probabilities are requested; `None` to request none.
@@ -79,6 +86,7 @@ impl RequestFields {
                 Temperature::Server => None,
                 Temperature::Of(value) => Some(value),
             },
+            seed: parameters.seed,
             stream_usage: true,
             top_logprobs: parameters.probabilities.then_some(TOP_LOGPROBS),
             thinking,
@@ -140,10 +148,11 @@ impl RequestFields {
                     ..self
                 }
             }
-            AdaptableField::Temperature if parameters.temperature == Temperature::Auto => Self {
-                temperature: None,
+            AdaptableField::Temperature { least } if parameters.is_default_temperature() => Self {
+                temperature: self.least_accepted(least, parameters),
                 ..self
             },
+            AdaptableField::Seed if parameters.origin.default_seed => Self { seed: None, ..self },
             AdaptableField::StreamUsage => Self {
                 stream_usage: false,
                 ..self
@@ -162,12 +171,20 @@ impl RequestFields {
         (adapted != self).then_some(adapted)
     }
 
+    /// Temperature after the refusal of a lower one: the least that the server accepts, which is closest to the likeliest answer, or none.
+    /// None with probabilities, because some servers compute them at the temperature.
+    fn least_accepted(self, least: Option<u16>, parameters: &Parameters) -> Option<f64> {
+        let least = f64::from(least.filter(|_| !parameters.probabilities)?) / 100.0;
+        (self.temperature? < least).then_some(least)
+    }
+
     /// True if a field differs from the `initial` fields.
     pub(in crate::ask) fn differs(self, field: AdaptableField, initial: Self) -> bool {
         match field {
             AdaptableField::Wire(_) => self.wire != initial.wire,
             AdaptableField::TokenField => self.token_field != initial.token_field,
-            AdaptableField::Temperature => self.temperature != initial.temperature,
+            AdaptableField::Temperature { .. } => self.temperature != initial.temperature,
+            AdaptableField::Seed => self.seed != initial.seed,
             AdaptableField::StreamUsage => self.stream_usage != initial.stream_usage,
             AdaptableField::Logprobs | AdaptableField::TopLogprobs => {
                 self.top_logprobs != initial.top_logprobs
@@ -186,8 +203,16 @@ impl RequestFields {
             TokenField::Omit => "no token limit is sent".to_owned(),
             field => format!("the token limit is sent as {field}"),
         });
-        let temperature = (self.temperature != initial.temperature)
-            .then(|| "no temperature is sent: the server's own is used".to_owned());
+        let temperature =
+            (self.temperature != initial.temperature).then(|| match self.temperature {
+                Some(least) => {
+                    format!("the temperature is sent as {least}, the least that it takes")
+                }
+                None => "no temperature is sent: the server's own is used".to_owned(),
+            });
+        let seed = (self.seed != initial.seed).then(|| {
+            "no seed is sent: replies at a temperature above 0 differ each time".to_owned()
+        });
         let usage = (self.stream_usage != initial.stream_usage)
             .then(|| "a stream is not asked for the number of its tokens".to_owned());
         let logprobs =
@@ -195,7 +220,7 @@ impl RequestFields {
                 Some(top) => format!("the probabilities of {top} tokens are asked for"),
                 None => "it states no probabilities: its confidence is not available".to_owned(),
             });
-        [wire, field, temperature, usage, logprobs]
+        [wire, field, temperature, seed, usage, logprobs]
             .into_iter()
             .flatten()
             .collect()
@@ -212,6 +237,46 @@ pub(in crate::ask) struct SentFields<'a> {
 }
 
 impl<'a> SentFields<'a> {
+    /// Flags of the fields sent that not all providers take, those of the user first.
+    pub(in crate::ask) fn optional_flags(self) -> Vec<String> {
+        let parameters = self.parameters;
+        let extra: Vec<&str> = parameters.extra.body.keys().map(String::as_str).collect();
+        let flags = [
+            (parameters.probabilities, "--request probabilities"),
+            (
+                parameters.constrain != Constrain::None,
+                "--request constrain",
+            ),
+            (parameters.reasoning_effort.is_some(), "--reasoning-effort"),
+            (parameters.thinking.is_some(), "--thinking"),
+            (parameters.top_p.is_some(), "--top-p"),
+        ];
+        let own = flags
+            .into_iter()
+            .filter(|(is_sent, _)| *is_sent)
+            .map(|(_, flag)| flag.to_owned());
+        let extra = (!extra.is_empty()).then(|| format!("--extra-body ({})", extra.join(", ")));
+        let sent = [
+            (
+                self.fields.seed.is_some(),
+                "the seed (--sampling-seed none)",
+            ),
+            (
+                self.fields.temperature.is_some(),
+                "the temperature (--temperature default)",
+            ),
+            (
+                self.fields.token_field != TokenField::Omit,
+                "the token limit (--request token-field=none)",
+            ),
+        ];
+        let sent = sent
+            .into_iter()
+            .filter(|(is_sent, _)| *is_sent)
+            .map(|(_, flag)| flag.to_owned());
+        own.chain(extra).chain(sent).collect()
+    }
+
     /// Fields that the user adds: the system message and `--extra-body`.
     pub(in crate::ask) fn user_fields(self) -> impl Iterator<Item = RequestField<'a>> {
         let extra = &self.parameters.extra;
@@ -303,7 +368,44 @@ pub(in crate::ask) struct RequestField<'a> {
     pub(in crate::ask) adaptable: Option<AdaptableField>,
 }
 
-impl RequestField<'_> {
+impl<'a> RequestField<'a> {
+    /// The temperature or seed sent, if the error is about it and no other field: it mentions no other sent field.
+    pub(in crate::ask) fn subject<'f>(
+        fields: &'f [RequestField<'a>],
+        api_error: &ApiError,
+    ) -> Option<&'f RequestField<'a>> {
+        let mut mentioned = fields.iter().filter(|field| {
+            let is_adapted = matches!(
+                field.adaptable,
+                Some(AdaptableField::Temperature { .. } | AdaptableField::Seed)
+            );
+            let is_ordinary = ORDINARY_WORDS.contains(&field.name) && !is_adapted;
+            field.state == FieldState::Sent
+                && field.is_mentioned(api_error)
+                && (!is_ordinary || field.is_quoted(api_error))
+        });
+        mentioned
+            .next()
+            .filter(|_| mentioned.next().is_none())
+            .filter(|field| {
+                matches!(
+                    field.adaptable,
+                    Some(AdaptableField::Temperature { .. } | AdaptableField::Seed)
+                )
+            })
+    }
+
+    /// Flags of the setting that decides the field, if a run may continue with another value after a refusal.
+    pub(in crate::ask) fn forced_flags(&self) -> &'static [&'static str] {
+        match self.name {
+            "temperature" => &["--temperature"],
+            "seed" => &["--sampling-seed"],
+            "top_p" => &["--top-p"],
+            "max_tokens" | "max_completion_tokens" | "max_output_tokens" => &["--max-tokens"],
+            _ => &[],
+        }
+    }
+
     /// True if the server names the field as the cause: in the `param` of the error, or in a message about an unsupported field.
     pub(in crate::ask) fn is_named(&self, api_error: &ApiError) -> bool {
         if self.is_param(api_error) {

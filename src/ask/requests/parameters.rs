@@ -8,6 +8,7 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
+use super::continued::{ChangedSetting, Continued};
 use super::extra_fields::ExtraFields;
 use super::thinking::Thinking;
 use super::token_field::TokenField;
@@ -27,7 +28,7 @@ pub struct Parameters {
     /// The model, by the endpoint's name.
     #[arg(skip)]
     pub model: String,
-    /// Sampling temperature; default is the server's own; auto is 0, or the server's own if the model refuses any other
+    /// Sampling temperature; default is the server's own; auto is 0, or if the model refuses 0 the least it takes or the server's own
     #[arg(long, value_name = "T|auto|default", default_value_t = Temperature::Auto, add = Decides::Reply)]
     pub temperature: Temperature,
     /// Nucleus sampling: draw from the likeliest tokens up to this total probability; default: not sent
@@ -39,10 +40,14 @@ pub struct Parameters {
     /// A letter needs 16; a reasoning model uses hundreds before it.
     #[arg(long, value_name = "N", default_value_t = Self::MAX_TOKENS, add = Decides::Reply)]
     pub max_tokens: NonZeroU32,
-    /// Smaller token limit with which the run began, which remains in the keys of its trials; `None` if the limit was not raised.
+    /// Other token limit with which the run began, which remains in the keys of its trials; `None` if the limit is the same.
     #[arg(skip)]
     #[serde(skip)]
     pub first_max_tokens: Option<NonZeroU32>,
+    /// Where the settings come from; not sent.
+    #[arg(skip)]
+    #[serde(skip)]
+    pub origin: SettingsOrigin,
     /// Field of the token limit; auto is the vendor's field, else max_tokens, or the other one if the server asks for it
     #[arg(long, value_name = "FIELD", value_enum, default_value_t = TokenField::Auto, add = Decides::Reply)]
     #[serde(skip)]
@@ -91,6 +96,7 @@ impl Parameters {
             seed: None,
             max_tokens: Self::MAX_TOKENS,
             first_max_tokens: None,
+            origin: SettingsOrigin::default(),
             token_field: TokenField::Auto,
             reasoning_effort: None,
             thinking: None,
@@ -107,9 +113,41 @@ impl Parameters {
         (self.token_field != TokenField::Omit).then_some(self.max_tokens.get())
     }
 
-    /// Token limit in requests, if it was raised after the run began.
-    pub(in crate::ask) fn raised_limit(&self) -> Option<u32> {
+    /// Token limit in requests, if the run began with another one.
+    pub(in crate::ask) fn changed_limit(&self) -> Option<u32> {
         self.limit().filter(|_| self.first_max_tokens.is_some())
+    }
+
+    /// Token limit with which the run began.
+    pub(in crate::ask) fn first_limit(&self) -> u32 {
+        self.first_max_tokens.unwrap_or(self.max_tokens).get()
+    }
+
+    /// True if the user did not set the temperature.
+    pub(in crate::ask) fn is_default_temperature(&self) -> bool {
+        self.temperature == Temperature::Auto || self.origin.default_temperature
+    }
+
+    /// The settings that differ from those in a run's column of the model; the address is ignored.
+    pub(crate) fn changes_from_column(&self, column: &Value) -> Vec<ChangedSetting> {
+        let own = self.content().as_object().cloned().unwrap_or_default();
+        ChangedSetting::between(column, &by_flag(own))
+    }
+
+    /// The same settings for a run whose column of the model has other ones, with the changes; its trial keys keep the column's settings.
+    pub(crate) fn continuing(&self, column: &Value, changes: Vec<ChangedSetting>) -> Self {
+        let first = column["--max-tokens"]
+            .as_u64()
+            .and_then(|limit| NonZeroU32::new(u32::try_from(limit).ok()?))
+            .filter(|first| *first != self.max_tokens);
+        Self {
+            first_max_tokens: first,
+            origin: SettingsOrigin {
+                continued: Some(Box::new(Continued::new(column, changes))),
+                ..self.origin.clone()
+            },
+            ..self.clone()
+        }
     }
 
     /// The same settings for a run that began with the smaller token limit `first`, which remains in the keys of its trials. `None` if the
@@ -155,6 +193,9 @@ impl Parameters {
 
     /// Settings that can change a reply, including the API and the token limit, but not the name of its field.
     pub(in crate::ask) fn content(&self) -> Value {
+        if let Some(first) = &self.origin.continued {
+            return first.content.clone();
+        }
         let mut content = json!(self);
         let first = self.first_max_tokens.map(NonZeroU32::get);
         content["max_tokens"] = first.or(self.limit()).into();
@@ -171,8 +212,21 @@ pub(crate) fn by_flag(content: Map<String, Value>) -> Map<String, Value> {
         .collect()
 }
 
+/// Where the settings of a model come from, besides their values.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct SettingsOrigin {
+    /// Settings of the run that these settings continue, which remain in the keys of its trials; `None` if they are the same.
+    pub(crate) continued: Option<Box<Continued>>,
+    /// True if the user did not set the temperature.
+    pub(crate) default_temperature: bool,
+    /// True if the user did not set the seed.
+    pub(crate) default_seed: bool,
+    /// True for the judge of open answers, whose settings have flags of their own.
+    pub(crate) is_judge: bool,
+}
+
 /// Flag that sets a parameter.
-fn flag_name(parameter: &str) -> String {
+pub(super) fn flag_name(parameter: &str) -> String {
     match parameter {
         "seed" => "--sampling-seed".to_owned(),
         // Keys of a models file that are not flags.
@@ -307,9 +361,36 @@ mod tests {
         let raised = raised.raised_from(base.max_tokens).unwrap();
         assert_eq!(raised.content(), base.content());
         assert_eq!(
-            (raised.limit(), raised.raised_limit()),
+            (raised.limit(), raised.changed_limit()),
             (Some(4096), Some(4096))
         );
         assert_eq!(base.raised_from(raised.max_tokens), None);
+    }
+
+    #[test]
+    fn continued_settings_keep_the_content_of_the_run() {
+        let mut first = Parameters::new("m".into());
+        first.seed = Some(7);
+        first.top_p = Some(0.5);
+        let column = Value::Object(by_flag(first.content().as_object().unwrap().clone()));
+        assert_eq!(first.changes_from_column(&column), []);
+        let mut own = Parameters::new("m".into());
+        own.temperature = Temperature::Server;
+        own.max_tokens = NonZeroU32::new(400).unwrap();
+        let changes = own.changes_from_column(&column);
+        let flags: Vec<&str> = changes.iter().map(|change| &*change.flag).collect();
+        assert_eq!(
+            flags,
+            [
+                "--max-tokens",
+                "--sampling-seed",
+                "--temperature",
+                "--top-p"
+            ]
+        );
+        let own = own.continuing(&column, changes);
+        assert_eq!(own.content(), first.content());
+        assert_eq!((own.changed_limit(), own.first_limit()), (Some(400), 1024));
+        assert_eq!(own.temperature, Temperature::Server);
     }
 }

@@ -9,6 +9,10 @@ use crate::ask::wire_kind::Wire;
 pub(super) const OMIT_PROBABILITIES: &str =
     "leave --request probabilities out: the server states none";
 
+/// Remedy for a server without a seed.
+const OMIT_SEED: &str =
+    "send no seed: --sampling-seed none, or leave seed out of the file of models";
+
 /// Name of `top_logprobs` in the refusals of Text Generation Inference.
 const TGI_TOP_LOGPROBS: &str = "top_n_tokens";
 
@@ -32,7 +36,7 @@ fn sampling_fields(sent: SentFields<'_>) -> Vec<RequestField<'static>> {
                 sent.fields.temperature.is_some(),
                 parameters.temperature == Temperature::Server,
             ),
-            adaptable: Some(AdaptableField::Temperature),
+            adaptable: Some(AdaptableField::Temperature { least: None }),
             hint: "leave the temperature to the server: --temperature default",
         },
         RequestField {
@@ -40,6 +44,12 @@ fn sampling_fields(sent: SentFields<'_>) -> Vec<RequestField<'static>> {
             state: FieldState::sent_if(parameters.top_p.is_some()),
             adaptable: None,
             hint: "leave --top-p out: the model takes no other than its own",
+        },
+        RequestField {
+            name: "seed",
+            state: FieldState::until_refused(sent.fields.seed.is_some(), parameters.seed.is_none()),
+            adaptable: Some(AdaptableField::Seed),
+            hint: OMIT_SEED,
         },
         RequestField {
             name: "max_tokens",

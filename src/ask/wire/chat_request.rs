@@ -89,7 +89,7 @@ pub(super) fn body(
         model: &parameters.model,
         temperature: fields.temperature,
         top_p: parameters.top_p,
-        seed: parameters.seed,
+        seed: fields.seed,
         max_tokens: limit_in(TokenField::MaxTokens),
         max_completion_tokens: limit_in(TokenField::MaxCompletionTokens),
         reasoning_effort: fields.effort(parameters),

@@ -80,7 +80,7 @@ pub(super) fn body(
         store: false,
         temperature: fields.temperature,
         top_p: parameters.top_p,
-        seed: parameters.seed,
+        seed: fields.seed,
         max_output_tokens: limit(parameters, fields),
         reasoning: effort.map(|effort| json!({"effort": effort})),
         text: (constrain == Constrain::Json).then(|| text_format(&letters)),
@@ -151,7 +151,7 @@ pub(super) fn fields(sent: SentFields<'_>) -> Vec<RequestField<'static>> {
                 sent.fields.temperature.is_some(),
                 parameters.temperature == Temperature::Server,
             ),
-            Some(AdaptableField::Temperature),
+            Some(AdaptableField::Temperature { least: None }),
             "leave the temperature to the server: --temperature default",
         ),
         field(
@@ -162,9 +162,9 @@ pub(super) fn fields(sent: SentFields<'_>) -> Vec<RequestField<'static>> {
         ),
         field(
             "seed",
-            FieldState::sent_if(parameters.seed.is_some()),
-            None,
-            "leave --sampling-seed out: the Responses API has no seed",
+            FieldState::until_refused(sent.fields.seed.is_some(), parameters.seed.is_none()),
+            Some(AdaptableField::Seed),
+            "send no seed, which the Responses API lacks: --sampling-seed none, or leave seed out of the file of models",
         ),
         field(
             "max_output_tokens",

@@ -5,10 +5,13 @@ use std::fmt::Write;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
+use serde_json::Value;
+
 use crate::ask::batch::{BatchLine, with_letter};
 use crate::ask::{Constrain, TokenBound};
 use crate::error::{Error, Result};
 use crate::files::reading;
+use crate::runs::changed_settings;
 use crate::store::Store;
 use crate::types::flags::read_word;
 use crate::types::manifests::RunManifest;
@@ -202,8 +205,8 @@ fn not_a_line(path: &Path, line: usize) -> Error {
 
 /// The constraint on the replies of a model, from the manifest.
 fn constrain(manifest: &RunManifest, model: &str) -> Result<Constrain> {
-    let models = manifest.columns.get("model");
-    let name = models.and_then(|models| models.get(model)?.get("--constrain")?.as_str());
+    let value = changed_settings::current(manifest, model, "--constrain");
+    let name = value.as_ref().and_then(Value::as_str);
     name.map_or(Ok(Constrain::None), read_word)
 }
 

@@ -141,6 +141,12 @@ impl Entry {
                 key if is_run_key(key) => {}
                 key => {
                     let words = words(key, located)?;
+                    let origin = &mut self.asking.parameters.origin;
+                    match key {
+                        "temperature" => origin.default_temperature = false,
+                        "seed" => origin.default_seed = false,
+                        _ => {}
+                    }
                     if key == "headers" {
                         // A table of headers replaces that of an earlier layer, even if it is empty.
                         self.asking.forget_headers();

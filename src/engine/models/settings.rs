@@ -15,9 +15,10 @@ use super::name::ModelName;
 use super::selection::{apply_set, retain_only};
 use super::trust::{self, Trust};
 use crate::ask::{AccessArgs, Parameters, Price, Sending, Server};
+use crate::engine::continuation::Continuation;
 use crate::error::{Error, Result};
 use crate::runs::shard::Shard;
-use crate::types::manifests::{Columns, Views};
+use crate::types::manifests::{JUDGES, Views};
 use crate::types::{ListedModel, View};
 
 /// One model of a run, with the settings of its requests.
@@ -178,10 +179,10 @@ impl AskSettings {
         })
     }
 
-    /// Adapts the settings to a run with these columns, so that a larger token limit does not change its trial keys. Models whose settings
-    /// the run has, under this or another name, are left as they are.
-    pub(crate) fn continue_from(&mut self, columns: &Columns) {
-        let Some(stored) = columns.get("model") else {
+    /// Adapts the settings to a stored run, so that settings that may change in it do not change its trial keys. Models whose settings the
+    /// run has, under this or another name, are left as they are.
+    pub(crate) fn continue_from(&mut self, run: &Continuation) {
+        let Some(stored) = run.columns.get("model") else {
             return;
         };
         for model in &mut self.models {
@@ -198,11 +199,14 @@ impl AskSettings {
             {
                 continue;
             }
-            let Some(column) = stored.get(&model.name) else {
-                continue;
-            };
-            if let Some(grown) = parameters.raised_from_column(column) {
-                model.parameters = grown;
+            // In a models file, a model with other settings is another model of the run. So is a judge of the same name.
+            let judges = run.columns.get(JUDGES);
+            let is_judge = judges
+                .and_then(|judges| judges.get(&model.name))
+                .is_some_and(|judge| stored.get(&model.name) == Some(judge));
+            let is_free = self.file.is_none() && !is_judge;
+            if let Some(accepted) = run.accept("model", &model.name, &parameters, is_free) {
+                model.parameters = accepted;
             }
         }
     }

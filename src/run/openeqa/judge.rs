@@ -6,12 +6,13 @@ use std::sync::Arc;
 
 use clap::Args;
 
-use crate::ask::{AccessArgs, KeyHeader, Parameters, Server, Temperature};
+use crate::ask::{AccessArgs, KeyHeader, Parameters, Server, SettingsOrigin, Temperature};
+use crate::engine::continuation::Continuation;
 use crate::engine::models::ModelName;
 use crate::engine::settings::JobArgs;
 use crate::error::Result;
 use crate::types::Decides;
-use crate::types::manifests::{Columns, JUDGES};
+use crate::types::manifests::JUDGES;
 use darkqa_score::choice::llm_match::Protocol;
 
 /// The flags of the judge, the model that marks the answers.
@@ -53,8 +54,8 @@ pub(super) struct Judge {
 }
 
 impl Judge {
-    /// Takes over the parameters of a stored run with these columns, if only the token limit has grown: this does not change marks.
-    pub(super) fn continue_from(&mut self, columns: &Columns) {
+    /// Continues the marks of a stored run under their keys, if the settings differ only in what may change in it.
+    pub(super) fn continue_from(&mut self, run: &Continuation) {
         let ModelName::Remote(id) = &self.model else {
             return;
         };
@@ -62,9 +63,8 @@ impl Judge {
             model: id.clone(),
             ..self.parameters.clone()
         };
-        let column = columns.get(JUDGES).and_then(|judges| judges.get(id));
-        if let Some(grown) = column.and_then(|column| own.raised_from_column(column)) {
-            self.parameters = grown;
+        if let Some(accepted) = run.accept(JUDGES, id, &own, true) {
+            self.parameters = accepted;
         }
     }
 }
@@ -113,6 +113,12 @@ impl JudgeArgs {
                 max_tokens: self.judge_max_tokens,
                 token_field: job.parameters.token_field,
                 seed,
+                origin: SettingsOrigin {
+                    default_temperature: job.unset.contains("judge-temperature"),
+                    default_seed: job.unset.contains("sampling-seed"),
+                    is_judge: true,
+                    ..SettingsOrigin::default()
+                },
                 ..Parameters::new(String::new())
             },
         }))

@@ -169,7 +169,7 @@ impl OpenEqaArgs {
             ..ExperimentSettings::default()
         })?;
         if let Some(judge) = &mut judge {
-            judge.continue_from(&job.columns());
+            judge.continue_from(&job.continuation());
         }
         if let Some(model) = job
             .ask

@@ -1,4 +1,4 @@
-//! Alerts about models asked with several token limits, because truncated replies were asked again: [`limit_alerts`].
+//! Alerts about models asked with another token limit than the run began with: [`limit_alerts`].
 
 use std::collections::BTreeMap;
 
@@ -23,8 +23,9 @@ pub(super) fn limit_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
             let limit = limit.map_or_else(|| first.clone(), |limit| limit.to_string());
             format!("{} with {limit}", plural(*count, "reply", "replies"))
         }).collect();
+        let count = if limits.len() == 1 { "another token limit than the run began with" } else { "several token limits" };
         let text = format!(
-            "{model} was asked with several token limits (--max-tokens): {}. A truncated reply is asked again when the limit grows.",
+            "{model} was asked with {count} (--max-tokens): {}. A truncated reply is asked again when the limit grows.",
             words.join(", ")
         );
         Alert::new(AlertKind::Parameters, text)

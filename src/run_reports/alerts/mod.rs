@@ -171,6 +171,7 @@ pub(super) fn run_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     alerts.extend(enhancer_alerts(&joined.runs));
     alerts.extend(input_alerts(&joined.runs));
     alerts.extend(adapted::adaptation_alerts(&joined.runs));
+    alerts.extend(adapted::change_alerts(&joined.runs));
     alerts.extend(noise::noise_alerts(joined));
     alerts.extend(noise::rounding_alert(joined));
     if joined.runs.len() > 1 {

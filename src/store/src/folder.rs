@@ -1,6 +1,6 @@
 //! The files of a run folder, and the check that a folder belongs to the requested run.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::ffi::OsStr;
 use std::fs::{self, TryLockError};
 use std::io::ErrorKind;
@@ -429,15 +429,33 @@ fn run_error(folder: &Path, problem: String) -> Result<()> {
 
 /// True if a run has a reply of a model, or may get one from a batch.
 fn has_reply(folder: &Path, stored: &RunManifest, model: &str) -> Result<bool> {
-    if folder.join(BATCH).exists() {
-        return Ok(true);
-    }
+    Ok(has_batches(folder) || count_replies(folder, stored, model)? > 0)
+}
+
+/// True if a run has files of batches, from which replies may come.
+#[must_use]
+pub fn has_batches(folder: &Path) -> bool {
+    folder.join(BATCH).exists()
+}
+
+/// Number of trials of a model with a reply in a run of any kind; 0 without a run.
+///
+/// # Errors
+/// If the manifest or the records cannot be read.
+pub fn reply_count(folder: &Path, model: &str) -> Result<usize> {
+    any_manifest(folder)?.map_or(Ok(0), |stored| count_replies(folder, &stored, model))
+}
+
+/// Number of trials of a model with a reply.
+fn count_replies(folder: &Path, stored: &RunManifest, model: &str) -> Result<usize> {
     let names = RecordedNames::from_manifest(stored);
-    let mut has_reply = false;
+    let mut answered = HashSet::new();
     each_line(&folder.join(RECORDS), |trial: StoredTrial| {
-        has_reply |= !trial.failed() && names.table_name(&trial.model) == model;
+        if !trial.failed() && names.table_name(&trial.model) == model {
+            answered.insert(trial.key);
+        }
     })?;
-    Ok(has_reply)
+    Ok(answered.len())
 }
 
 /// Creates a run in a new or empty folder: writes the manifest before any other file. A new folder is private to this user.

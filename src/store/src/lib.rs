@@ -59,9 +59,9 @@ pub use stored_trial::StoredTrial;
 
 pub use folder::{
     AddressChange, BATCH, BATCH_STATE, PLAN, check_same_run, each_placed_question, each_question,
-    find, is_locked, is_run, manifest_damage, now, read_columns, read_fidelity, read_manifest,
-    read_questions, read_records, read_settings, read_thumbnails, read_trials, restore_manifest,
-    schema,
+    find, has_batches, is_locked, is_run, manifest_damage, now, read_columns, read_fidelity,
+    read_manifest, read_questions, read_records, read_settings, read_thumbnails, read_trials,
+    reply_count, restore_manifest, schema,
 };
 
 /// The trials that were sent in batches.
@@ -390,7 +390,7 @@ impl<D: Detail> Store<D> {
         each_line(&self.folder.join(RECORDS), |record: StoredTrial| {
             // A truncated reply does not answer a request that was sent again with a larger limit.
             let limit = limits.get(&record.key);
-            let is_truncated = limit.is_some_and(|limit| record.is_truncated_below(*limit));
+            let is_truncated = limit.is_some_and(|limit| record.is_truncated_below(*limit, 0));
             if !record.failed() && !is_truncated {
                 pending.remove(&record.key);
             } else if record.via == Via::Batch

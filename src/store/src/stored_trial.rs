@@ -21,7 +21,7 @@ pub struct StoredTrial {
     failure: Option<IgnoredAny>,
     #[serde(default, rename = "finish", deserialize_with = "is_length")]
     is_truncated: bool,
-    /// The token limit of the reply, if it exceeds that of the run's first call.
+    /// The token limit of the reply, if it differs from that of the run's first call.
     max_tokens: Option<NonZeroU32>,
     #[serde(default)]
     usage: Tokens,
@@ -37,9 +37,9 @@ impl StoredTrial {
         self.failure.is_some()
     }
 
-    /// True if the reply was truncated at a token limit below this one.
-    pub fn is_truncated_below(&self, limit: u32) -> bool {
-        self.is_truncated && !self.failed() && self.limit() < Some(limit)
+    /// True if the reply was truncated at a token limit below this one; `first` is that of the run's first call.
+    pub fn is_truncated_below(&self, limit: u32, first: u32) -> bool {
+        self.is_truncated && !self.failed() && self.limit().unwrap_or(first) < limit
     }
 
     fn limit(&self) -> Option<u32> {
@@ -64,7 +64,7 @@ impl StoredTrial {
     /// Merges an earlier record of the same trial into this one, and adds its cost. Must be called with the latest of the earlier records
     /// first.
     ///
-    /// The earlier record may be the same reply, parsed by other rules, whose attempts are not counted twice; a reply with a smaller token
+    /// The earlier record may be the same reply, parsed by other rules, whose attempts are not counted twice; a reply with another token
     /// limit; or a reply that this record failed to replace.
     pub(super) fn add_earlier(&mut self, earlier: &Self) {
         let own = self.lost.as_deref().copied().unwrap_or_default();
@@ -75,7 +75,7 @@ impl StoredTrial {
             lost = own.plus(before);
         } else if earlier.failed() {
             lost = own.plus(before);
-        } else if earlier.limit() < self.limit() {
+        } else if earlier.limit() != self.limit() {
             lost = own.plus(before);
             lost.add(earlier.usage());
         }
@@ -120,9 +120,12 @@ mod tests {
     fn truncated_replies_are_charged() {
         let first = reply("null", "length");
         assert!(
-            first.is_truncated_below(2000) && !reply("2000", "length").is_truncated_below(2000)
+            first.is_truncated_below(2000, 1024)
+                && !reply("2000", "length").is_truncated_below(2000, 1024)
         );
-        assert!(!reply("null", "stop").is_truncated_below(2000));
+        assert!(!reply("null", "stop").is_truncated_below(2000, 1024));
+        assert!(!first.is_truncated_below(400, 1024) && !first.is_truncated_below(1024, 1024));
+        assert!(reply("400", "length").is_truncated_below(1024, 1024));
         let mut last = reply("2000", "stop");
         last.add_earlier(&first);
         assert_eq!(
@@ -134,7 +137,7 @@ mod tests {
         );
         let mut failed = trial("{}", 2);
         failed.add_earlier(&first);
-        assert!(!failed.failed() && failed.is_truncated_below(2000));
+        assert!(!failed.failed() && failed.is_truncated_below(2000, 1024));
         assert_eq!(failed.lost_attempts(), 2);
     }
 

@@ -10,8 +10,8 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use darkqa_eval::internals::ask::{
     Access, BaseUrl, Call, Constrain, Endpoint, ExtraFields, ImageDetail, Message, Model,
-    Parameters, Prompts, Query, Random, Remote, Script, Secret, Sending, Temperature, TokenField,
-    WireSetting,
+    Parameters, Prompts, Query, Random, Remote, Script, Secret, Sending, SettingsOrigin,
+    Temperature, TokenField, WireSetting,
 };
 use darkqa_ground::types::{
     Choices, Digest, FailureKind, Family, Finish, FrameId, Question, QuestionId, Reply, Rgb, View,
@@ -124,6 +124,7 @@ async fn only_configured_settings_are_sent() {
         constrain: Constrain::None,
         probabilities: false,
         extra: ExtraFields::default(),
+        origin: SettingsOrigin::default(),
     };
     let model = Remote::open(endpoint.clone(), parameters).unwrap();
     let images = [image(), image()].map(Arc::new);

@@ -7,6 +7,7 @@ mod openeqa;
 mod parts_of_commands;
 mod pins;
 mod plan;
+mod remedies;
 mod shards;
 mod walks;
 mod walks_in_parts;

@@ -235,7 +235,7 @@ async fn exclusion_concerns_a_single_model() {
 async fn refused_fields_exclude_no_replica() {
     let all = new_balancer(2);
     let field = AskError {
-        refused_field: Some(AdaptableField::Temperature),
+        refused_field: Some(AdaptableField::Temperature { least: None }),
         ..failed(FailureKind::Request, Some(403), Reach::Endpoint)
     };
     assert_eq!(all.record_failure(ONE, 0, &field), Failover::None);

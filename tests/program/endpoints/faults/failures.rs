@@ -111,7 +111,7 @@ fn general_faults_are_told_apart() {
     let cases = [
         ("401", Answer::error(401, "x", "no"), "--api-key-env"),
         ("402", Answer::error(402, "x", "pay"), "credit"),
-        ("403", Answer::error(403, "x", "no"), "key"),
+        ("403", Answer::error(403, "x", "forbidden"), "key"),
         ("404", Answer::new(404, ""), "--base-url"),
         (
             "404 of a model",

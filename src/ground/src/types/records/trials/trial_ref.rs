@@ -207,7 +207,7 @@ impl<'t, D: StoredDetail> TrialRef<'t, D> {
     /// Cost of this trial in addition to that of `other`, which has the same key and replaces it. If both have the same token limit and a
     /// reply, it is one reply that was parsed twice: the cost is zero.
     pub(super) fn paid_besides(self, other: Self) -> LostAttempts {
-        let is_asked_again = self.max_tokens() < other.max_tokens();
+        let is_asked_again = self.max_tokens() != other.max_tokens();
         let mut paid = LostAttempts::default();
         if self.failed() || is_asked_again {
             paid = self.lost();
