@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::time::Instant;
 
-use crate::ask::ImageLimit;
+use crate::ask::{HeldBack, ImageLimit};
 use crate::engine::batch::journal::Journal;
 use crate::engine::circuit_breaker::EndReason;
 use crate::engine::costs::{Budget, InFlightCost, RunModels};
@@ -348,7 +348,11 @@ impl<E: Experiment> OpenRun<'_, E> {
         self.note_enhancers(usages);
         if settings.show_timings {
             let threads = workers.single_threaded.len();
-            let line = timings.summary(started.elapsed(), threads);
+            let held_back = models
+                .iter()
+                .map(|model| model.model.held_back())
+                .fold(HeldBack::default(), HeldBack::longest);
+            let line = timings.summary(started.elapsed(), threads, held_back);
             let line = match E::PHASES {
                 [_] => line,
                 phases => format!("{}: {line}", phases[phase]),

@@ -19,7 +19,7 @@ use super::url::BaseUrl;
 use crate::ask::batch_api::BatchServer;
 use crate::ask::costs::{Charge, Reservation};
 use crate::ask::failures::{AskError, Reach, Retry};
-use crate::ask::pace::{Gate, Quota, RateLimits};
+use crate::ask::pace::{Gate, HeldBack, Quota, RateLimits};
 use crate::ask::requests::Request;
 use crate::ask::vendors::Vendor;
 use crate::ask::wire_kind::Wire;
@@ -149,6 +149,16 @@ impl Endpoint {
     ///
     /// # Errors
     /// If a header value has characters that HTTP does not allow.
+    /// Time for which requests had to wait for their turn so far.
+    pub(in crate::ask) fn held_back(&self) -> HeldBack {
+        self.replicas
+            .iter()
+            .map(|replica| &replica.gate)
+            .chain(&self.quota)
+            .map(Gate::held_back)
+            .fold(HeldBack::default(), HeldBack::longest)
+    }
+
     pub(crate) fn batch_server(&self) -> Result<BatchServer> {
         let first = &self.replicas[0];
         let headers = first.headers(Wire::Chat)?;

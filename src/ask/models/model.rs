@@ -12,6 +12,7 @@ use crate::ask::batch;
 use crate::ask::batch_api::BatchServer;
 use crate::ask::costs::{Reservation, image_tokens};
 use crate::ask::failures::AskError;
+use crate::ask::pace::HeldBack;
 use crate::ask::requests::{Call, Message, Parameters};
 use crate::error::Result;
 use crate::types::{Digest, Reply};
@@ -102,6 +103,12 @@ impl Model {
     #[must_use]
     pub fn adapted(&self) -> Vec<String> {
         self.remote().map_or_else(Vec::new, Remote::adapted)
+    }
+
+    /// Time for which requests to the model's endpoint had to wait for their turn so far; zero for built-in models.
+    pub(crate) fn held_back(&self) -> HeldBack {
+        self.remote()
+            .map_or_else(HeldBack::default, |model| model.endpoint().held_back())
     }
 
     /// Number of tokens of an image of this width and height, in pixels; `None` if unknown.
