@@ -301,6 +301,12 @@ impl<E: Experiment> OpenRun<'_, E> {
             Vec::new()
         };
         self.begin(counts, &stored)?;
+        let timed_out: HashSet<TrialKey> = stored
+            .iter()
+            .filter(|trial| trial.timed_out_at_gateway())
+            .map(|trial| trial.key)
+            .collect();
+        warn_of_timeouts(plan.remaining_where(|key| timed_out.contains(key)));
         drop(stored);
         let workers = Workers::start(settings.loading.threads.threads)?;
         let timings = Timings::default();
@@ -337,6 +343,7 @@ impl<E: Experiment> OpenRun<'_, E> {
             progress: self.progress,
             settings,
             timings: &timings,
+            timed_out,
             in_flight_cost,
             token_flag: experiment.token_flag(phase),
         };
@@ -524,6 +531,21 @@ pub(crate) fn missing_notes<E: Experiment>(experiment: &E, folder: &Path) -> Mis
     let thumbnails = MissingThumbnails::new(names, store::read_thumbnails(folder));
     let thumbnails = thumbnails.with_objects(&experiment.questions());
     MissingNotes::new(thumbnails, store::read_fidelity(folder))
+}
+
+/// Notes the number of trials that a gateway gave up on in an earlier call.
+fn warn_of_timeouts(trials: usize) {
+    if trials > 0 {
+        let (trials, were, each) = if trials == 1 {
+            ("1 trial".to_owned(), "was", "it")
+        } else {
+            (format!("{trials} trials"), "were", "each")
+        };
+        tracing::warn!(
+            "{trials} {were} given up by a gateway in an earlier call, and may have been charged: {each} is asked once more, as a stream if \
+             --request wire permits, and given up at the next timeout"
+        );
+    }
 }
 
 /// Keys of the trials without a reply that were charged as often as `--retries paid` allows.

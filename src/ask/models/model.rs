@@ -217,19 +217,23 @@ impl Model {
 
     /// Asks one question. Dropping the future abandons the request.
     pub async fn ask(&self, call: Call<'_>) -> Result<Reply, AskError> {
-        self.ask_within(call, None).await
+        self.ask_within(call, None, false).await
     }
 
-    /// Asks one question; the reservation covers the cost of each of its requests.
+    /// Asks one question; the reservation covers the cost of each of its requests. A question that timed out at a gateway in an earlier
+    /// call (`has_timed_out`) is given up at the next timeout.
     pub(crate) async fn ask_within(
         &self,
         call: Call<'_>,
         reservation: Option<&Reservation>,
+        has_timed_out: bool,
     ) -> Result<Reply, AskError> {
         match self {
             Self::Remote(model) => {
                 let choices = call.query.choice_count();
-                model.ask_within(call.message, choices, reservation).await
+                model
+                    .ask_within(call.message, choices, reservation, has_timed_out)
+                    .await
             }
             Self::Random(random) => {
                 let question = call.query.require_choices()?;

@@ -23,7 +23,7 @@ pub(super) use field::{
 pub(crate) use image_limit::ImageLimit;
 pub(crate) use parameters::by_flag;
 pub use parameters::{Constrain, ImageDetail, Parameters, Temperature};
-pub(super) use request::Request;
+pub(super) use request::{AfterTimeout, Request};
 pub(super) use request_body::RequestBody;
 pub use thinking::Thinking;
 pub use token_field::TokenField;
