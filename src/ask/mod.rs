@@ -34,8 +34,10 @@ pub(crate) use failures::QuotaRefusal;
 pub use failures::{AskError, Reach};
 pub(crate) use models::{Local, LocalAnswer};
 pub use models::{Model, Random, Remote, Script};
-pub(crate) use pace::ConcurrencyBounds;
+#[cfg(test)]
+pub(crate) use pace::PaceCause;
 pub use pace::Quota;
+pub(crate) use pace::{ConcurrencyBounds, HeldBack};
 pub use prompts::Prompts;
 pub use requests::{
     Call, Constrain, ExtraFields, ImageDetail, Message, Parameters, Query, SettingsOrigin,

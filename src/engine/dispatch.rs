@@ -1,7 +1,7 @@
 //! The asynchronous part of a run: sends the trials of prepared groups, and stores each reply when it arrives ([`Dispatcher`]).
 
 use std::cell::RefCell;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -11,13 +11,15 @@ use tokio::sync::watch;
 use tokio::task::{JoinError, JoinSet};
 use tokio::time::timeout;
 
-use crate::ask::{AskError, Call, Reach, Reservation, sleep_running};
+use crate::ask::{AskError, Reach, sleep_running};
 use crate::engine::circuit_breaker::{CircuitBreaker, EndReason};
 use crate::engine::costs::{Budget, BudgetNotes, InFlightCost, Permit, TokenCheck};
 use crate::engine::first_failures::FirstFailures;
 use crate::engine::interrupt::Interrupt;
 use crate::engine::lanes::{Lanes, PreparedTrial};
 use crate::engine::models::ModelUnderTest;
+use crate::engine::sending::{Finished, send};
+use crate::engine::served_names::ServedNames;
 use crate::engine::settings::JobSettings;
 use crate::engine::suspects::Suspects;
 use crate::engine::truncation::TruncationCheck;
@@ -29,7 +31,7 @@ use crate::images::timings::{TimedStep, Timings};
 use crate::images::trials::{Item, PreparedGroup, Trial};
 use crate::images::workers::thread_start_error;
 use crate::store::Store;
-use crate::types::{Digest, FailureKind, Finish, LostAttempts, Record, Reply, SetLight};
+use crate::types::{Digest, FailureKind, Finish, Record, SetLight, TrialKey};
 use darkqa_score::answers::record::answered;
 use darkqa_score::answers::{ImageDependence, LitReply};
 
@@ -42,6 +44,8 @@ pub(crate) struct Dispatcher<'a> {
     pub(crate) progress: &'a Progress,
     pub(crate) settings: &'a JobSettings,
     pub(crate) timings: &'a Timings,
+    /// Trials that a gateway gave up on in an earlier call.
+    pub(crate) timed_out: HashSet<TrialKey>,
     pub(crate) in_flight_cost: InFlightCost,
     /// The flag of the token limit of these models.
     pub(crate) token_flag: &'static str,
@@ -55,9 +59,6 @@ pub(crate) struct TrialCounts {
     /// Number of trials with a reply.
     pub(crate) answered: usize,
 }
-
-/// One trial, with its reply or error.
-type Finished<I> = (PreparedTrial<I>, Result<Reply, AskError>);
 
 impl Dispatcher<'_> {
     /// Asks the trials of the groups that `make` sends. `make` runs on a separate thread until the channel is closed. `stoppers` cancel
@@ -94,6 +95,7 @@ impl Dispatcher<'_> {
             in_flight_cost: self.in_flight_cost,
             are_notes_lost: false,
             first_failures: FirstFailures::default(),
+            served: vec![ServedNames::default(); self.models.len()],
         };
         std::thread::scope(|scope| {
             scope.spawn(move || make(&sender));
@@ -149,6 +151,8 @@ struct ReplySink<'a, I: Item> {
     /// True if a note about an image could not be written.
     are_notes_lost: bool,
     first_failures: FirstFailures,
+    /// Names in the replies to each model.
+    served: Vec<ServedNames>,
 }
 
 /// State of the first question to a model. With `--max-cost`, other questions wait until it ends, because the charged tokens of prompts
@@ -187,7 +191,14 @@ impl<I: Item> ReplySink<'_, I> {
                         }
                         let model = &self.dispatcher.models[ready.trial.model];
                         let given_up = self.given_up.subscribe();
-                        in_flight.spawn(send(model.clone(), ready, permit, given_up));
+                        let has_timed_out = self.dispatcher.timed_out.contains(&ready.trial.key);
+                        in_flight.spawn(send(
+                            model.clone(),
+                            ready,
+                            permit,
+                            has_timed_out,
+                            given_up,
+                        ));
                     }
                 }
             }
@@ -478,6 +489,7 @@ impl<I: Item> ReplySink<'_, I> {
         if let Ok(reply) = &result {
             self.answered += 1;
             self.truncation.count(reply);
+            self.served[trial.model].add(&self.dispatcher.models[trial.model], reply);
             if let Some(usage) = reply.usage {
                 let model = &self.dispatcher.models[trial.model];
                 let images = ready.stimulus.images.iter().map(|image| image.facts());
@@ -519,46 +531,4 @@ impl<I: Item> ReplySink<'_, I> {
             tracing::warn!("{}", found.words(&model.name));
         }
     }
-}
-
-/// Sends one trial to its model, unless it is given up first. Returns the trial with its reply or error, including the cost of lost
-/// attempts.
-async fn send<I: Item>(
-    model: ModelUnderTest,
-    ready: PreparedTrial<I>,
-    permit: Permit,
-    mut given_up: watch::Receiver<bool>,
-) -> Finished<I> {
-    let PreparedTrial { trial, stimulus } = &ready;
-    let call = Call {
-        query: trial.item.query(),
-        condition: stimulus.condition.as_ref(),
-        message: trial.prompt.message(&stimulus.images),
-        turn: trial.item.turn(),
-    };
-    let reservation = match &permit {
-        Permit::Reserved(reservation) => Some(&**reservation),
-        Permit::Free | Permit::Refused => None,
-    };
-    let asked = tokio::select! {
-        biased;
-        result = model.model.ask_within(call, reservation) => Some(result),
-        _ = given_up.wait_for(|given_up| *given_up) => None,
-    };
-    let charged = reservation.map_or_else(LostAttempts::default, Reservation::charged);
-    let result = match asked {
-        Some(Ok(mut reply)) => {
-            reply.lost.unstated = charged.unstated;
-            Ok(reply)
-        }
-        Some(Err(mut error)) => {
-            error.lost.unstated = charged.unstated;
-            Err(error)
-        }
-        None => Err(AskError {
-            lost: Box::new(charged),
-            ..AskError::given_up()
-        }),
-    };
-    (ready, result)
 }

@@ -24,6 +24,8 @@ pub(crate) mod observer;
 pub(crate) mod open_files;
 pub(crate) mod open_run;
 pub(crate) mod room_net;
+mod sending;
+mod served_names;
 pub(crate) mod settings;
 pub(crate) mod suspects;
 pub(crate) mod truncation;

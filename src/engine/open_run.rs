@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::time::Instant;
 
-use crate::ask::ImageLimit;
+use crate::ask::{HeldBack, ImageLimit};
 use crate::engine::batch::journal::Journal;
 use crate::engine::circuit_breaker::EndReason;
 use crate::engine::costs::{Budget, InFlightCost, RunModels};
@@ -303,6 +303,12 @@ impl<E: Experiment> OpenRun<'_, E> {
             Vec::new()
         };
         self.begin(counts, &stored)?;
+        let timed_out: HashSet<TrialKey> = stored
+            .iter()
+            .filter(|trial| trial.timed_out_at_gateway())
+            .map(|trial| trial.key)
+            .collect();
+        warn_of_timeouts(plan.remaining_where(|key| timed_out.contains(key)));
         drop(stored);
         let workers = Workers::start(settings.loading.threads.threads)?;
         let timings = Timings::default();
@@ -339,6 +345,7 @@ impl<E: Experiment> OpenRun<'_, E> {
             progress: self.progress,
             settings,
             timings: &timings,
+            timed_out,
             in_flight_cost,
             token_flag: experiment.token_flag(phase),
         };
@@ -350,7 +357,11 @@ impl<E: Experiment> OpenRun<'_, E> {
         self.note_enhancers(usages);
         if settings.show_timings {
             let threads = workers.single_threaded.len();
-            let line = timings.summary(started.elapsed(), threads);
+            let held_back = models
+                .iter()
+                .map(|model| model.model.held_back())
+                .fold(HeldBack::default(), HeldBack::longest);
+            let line = timings.summary(started.elapsed(), threads, held_back);
             let line = match E::PHASES {
                 [_] => line,
                 phases => format!("{}: {line}", phases[phase]),
@@ -523,6 +534,21 @@ pub(crate) fn missing_notes<E: Experiment>(experiment: &E, folder: &Path) -> Mis
     let thumbnails = MissingThumbnails::new(names, store::read_thumbnails(folder));
     let thumbnails = thumbnails.with_objects(&experiment.questions());
     MissingNotes::new(thumbnails, store::read_fidelity(folder))
+}
+
+/// Notes the number of trials that a gateway gave up on in an earlier call.
+fn warn_of_timeouts(trials: usize) {
+    if trials > 0 {
+        let (trials, were, each) = if trials == 1 {
+            ("1 trial".to_owned(), "was", "it")
+        } else {
+            (format!("{trials} trials"), "were", "each")
+        };
+        tracing::warn!(
+            "{trials} {were} given up by a gateway in an earlier call, and may have been charged: {each} is asked once more, as a stream if \
+             --request wire permits, and given up at the next timeout"
+        );
+    }
 }
 
 /// Keys of the trials without a reply that were charged as often as `--retries paid` allows.

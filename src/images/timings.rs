@@ -4,6 +4,8 @@ use std::fmt;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
+use crate::ask::HeldBack;
+
 /// A step of the image pipeline, or a state of the request queue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum TimedStep {
@@ -61,12 +63,14 @@ impl Timings {
         self.nanoseconds[step as usize].load(Ordering::Relaxed) as f64 / 1e9
     }
 
-    /// One line with the time of each step and the bottleneck of a run that took this time on `threads` threads.
-    pub(crate) fn summary(&self, took: Duration, threads: usize) -> String {
+    /// One line with the time of each step and the bottleneck of a run that took this time on `threads` threads. `held_back` is the time
+    /// for which requests had to wait for their turn.
+    pub(crate) fn summary(&self, took: Duration, threads: usize, held_back: HeldBack) -> String {
         TimingsText {
             timings: self,
             took: took.as_secs_f64(),
             threads,
+            held_back,
         }
         .to_string()
     }
@@ -77,6 +81,7 @@ struct TimingsText<'a> {
     /// Duration of the run, in seconds.
     took: f64,
     threads: usize,
+    held_back: HeldBack,
 }
 
 impl fmt::Display for TimingsText<'_> {
@@ -85,6 +90,7 @@ impl fmt::Display for TimingsText<'_> {
             timings,
             took,
             threads,
+            held_back,
         } = *self;
         let image_steps = [
             TimedStep::Decode,
@@ -111,6 +117,11 @@ impl fmt::Display for TimingsText<'_> {
             100.0 * busy / (took * threads as f64).max(1e-9),
             timings.seconds(TimedStep::Waiting)
         )?;
+        let (cause, wait) = held_back.main_cause();
+        let wait = wait.as_secs_f64();
+        if wait > idle && wait > took / 4.0 {
+            return write!(f, "held back {wait:.1} s: {cause}");
+        }
         let slowest = image_steps
             .into_iter()
             .max_by(|a, b| timings.seconds(*a).total_cmp(&timings.seconds(*b)));
@@ -134,6 +145,7 @@ impl fmt::Display for TimingsText<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ask::PaceCause;
 
     /// The summary of a run of 10 s on 2 threads, with these seconds per step.
     fn summary(steps: &[(TimedStep, u64)]) -> String {
@@ -141,7 +153,26 @@ mod tests {
         for (step, seconds) in steps {
             timings.add(*step, Duration::from_secs(*seconds));
         }
-        timings.summary(Duration::from_secs(10), 2)
+        timings.summary(Duration::from_secs(10), 2, HeldBack::default())
+    }
+
+    #[test]
+    fn the_summary_names_limits_that_hold_requests_back() {
+        let line = |cause, seconds| {
+            let timings = Timings::default();
+            timings.add(TimedStep::Full, Duration::from_secs(8));
+            let held_back = HeldBack::seconds(cause, seconds);
+            timings.summary(Duration::from_secs(10), 2, held_back)
+        };
+        let stated = line(PaceCause::ReportedLimits, 5);
+        assert!(
+            stated.contains("held back 5.0 s: the limits per minute that the endpoint states"),
+            "{stated}"
+        );
+        assert!(line(PaceCause::Refusals, 5).contains("turns requests away"));
+        assert!(line(PaceCause::Quota, 5).contains("--rpm or --tpm limits the speed"));
+        let short = line(PaceCause::Quota, 1);
+        assert!(short.contains("the endpoint limits the speed"), "{short}");
     }
 
     #[test]

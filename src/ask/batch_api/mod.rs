@@ -111,11 +111,11 @@ impl BatchServer {
         let request = self.request(Method::GET, &path, &[]);
         let response = self
             .connection
-            .download(request, to, max_bytes)
+            .download(request, &self.headers, to, max_bytes)
             .await
             .map_err(with_possible_effect)?;
         self.check_status(response)?;
-        remove_secrets(to, &self.connection.scrub).map_err(|e| {
+        remove_secrets(to, &self.connection.scrub()).map_err(|e| {
             let message = format!("{}: keys in it could not be removed: {e}", to.display());
             AskError::new(FailureKind::Request, message)
         })
@@ -125,7 +125,7 @@ impl BatchServer {
     /// form.
     #[must_use]
     pub(crate) fn line(&self, line: &str) -> Option<BatchLine> {
-        BatchLine::read_without_secrets(line, &self.connection.scrub)
+        BatchLine::read_without_secrets(line, &self.connection.scrub())
     }
 
     /// Deletes a file.
@@ -157,9 +157,10 @@ impl BatchServer {
     /// Lists all batches.
     pub(crate) async fn batches(&self) -> ApiResult<Vec<RemoteBatch>> {
         let items = self.list("batches", &[]).await?;
+        let scrub = self.connection.scrub();
         Ok(items
             .iter()
-            .filter_map(|item| RemoteBatch::from_json(item, &self.connection.scrub))
+            .filter_map(|item| RemoteBatch::from_json(item, &scrub))
             .collect())
     }
 
@@ -174,7 +175,7 @@ impl BatchServer {
     /// Sends a request whose response is a batch.
     async fn request_batch(&self, request: RequestBuilder) -> ApiResult<RemoteBatch> {
         let object = self.request_json(request).await?;
-        RemoteBatch::from_json(&object, &self.connection.scrub)
+        RemoteBatch::from_json(&object, &self.connection.scrub())
             .ok_or_else(|| self.unreadable("a batch without id or status"))
     }
 
@@ -206,11 +207,9 @@ impl BatchServer {
         Ok(items)
     }
 
-    /// Builds a request with the headers of the account.
+    /// Builds a request without the headers of the account.
     fn request(&self, method: Method, path: &str, query: &[(&str, &str)]) -> RequestBuilder {
-        self.connection
-            .request(method, path, query)
-            .headers(self.headers.clone())
+        self.connection.request(method, path, query)
     }
 
     /// Sends a request whose response is JSON.
@@ -236,7 +235,7 @@ impl BatchServer {
     ) -> ApiResult<HttpResponse> {
         let response = self
             .connection
-            .exchange(request, Deadline::total(timeout))
+            .exchange_keyed(request, &self.headers, Deadline::total(timeout))
             .await
             .map_err(with_possible_effect)?;
         self.check_status(response)
@@ -249,7 +248,7 @@ impl BatchServer {
         }
         let status = response.status.as_u16();
         let api_error = ApiError::from_body(&String::from_utf8_lossy(&response.body));
-        let (base, scrub) = (&self.connection.base, &self.connection.scrub);
+        let (base, scrub) = (&self.connection.base, self.connection.scrub());
         let text = scrub.line(&api_error.message);
         let separator = if text.is_empty() { "" } else { ": " };
         let message = format!("{base} answered {status}{separator}{text}");
@@ -257,7 +256,7 @@ impl BatchServer {
         failed.failure.status = Some(status);
         failed.may_have_effect = status >= 500;
         failed.wait = retry_after(&response.headers, SystemTime::now()).max(api_error.wait);
-        failed.quota = QuotaRefusal::from_api_error(&api_error, scrub).map(Box::new);
+        failed.quota = QuotaRefusal::from_api_error(&api_error, &scrub).map(Box::new);
         Err(failed)
     }
 

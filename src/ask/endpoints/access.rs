@@ -1,7 +1,7 @@
 //! The address, key and certificates of an endpoint: [`Access`].
 
 use std::error::Error as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -30,6 +30,8 @@ pub struct Access {
     pub base: BaseUrl,
     /// API key; `None` to send no header with a key.
     pub key: Option<Secret>,
+    /// File of the key, which is read again if the server refuses the key; `None` for a key from elsewhere.
+    pub key_file: Option<PathBuf>,
     /// The header that carries the key.
     pub key_header: KeyHeader,
     /// Headers that name the account and are not secret, such as `OpenAI-Organization` and `OpenAI-Project`.
@@ -52,6 +54,7 @@ impl Access {
             vendor: Vendor::at_host(base.host()),
             base,
             key: None,
+            key_file: None,
             key_header: KeyHeader::Auto,
             account: Vec::new(),
             headers: CustomHeaders::default(),
@@ -92,11 +95,7 @@ impl Access {
 
     /// Headers of every request through this API.
     pub(super) fn headers(&self, wire: Wire) -> Result<HeaderMap> {
-        let key_header = match self.key_header {
-            KeyHeader::Auto => self.vendor.map_or(KeyHeader::Bearer, Vendor::key_header),
-            explicit => explicit,
-        };
-        let mut headers = wire.headers(self.key.as_ref(), key_header)?;
+        let mut headers = self.key_headers(self.key.as_ref(), wire)?;
         for (name, text) in &self.account {
             let value = HeaderValue::try_from(text).map_err(|_| {
                 Error::usage(
@@ -111,6 +110,15 @@ impl Access {
         }
         self.headers.add_to(&mut headers)?;
         Ok(headers)
+    }
+
+    /// Header with this key.
+    pub(super) fn key_headers(&self, key: Option<&Secret>, wire: Wire) -> Result<HeaderMap> {
+        let key_header = match self.key_header {
+            KeyHeader::Auto => self.vendor.map_or(KeyHeader::Bearer, Vendor::key_header),
+            explicit => explicit,
+        };
+        wire.headers(key, key_header)
     }
 
     /// HTTP client for all requests, with a time limit for connecting only.

@@ -11,11 +11,12 @@ use reqwest::{Client, Method, RequestBuilder, Response, StatusCode};
 use tokio::time::Instant;
 
 use super::access::{Access, connect_timeout, with_causes};
+use super::account_key::{AccountKey, KeyedHeaders};
 use super::connection_fault::{UNKNOWN_HOST, is_unknown_host, lacks_open_files, permanent_cause};
 use super::proxy::proxy_variable;
 use super::time_limit::TimeLimit;
 use super::url::BaseUrl;
-use crate::ask::failures::{AskError, Reach, Retry};
+use crate::ask::failures::{AskError, LONG_SILENCE, Reach, Retry, Unfinished};
 use crate::ask::replies::bounded_json::parse;
 use crate::ask::requests::{Parameters, RequestBody};
 use crate::ask::secrets::Scrub;
@@ -111,11 +112,12 @@ enum ReachedLimit {
     Idle(Duration),
 }
 
-/// Pooled connections to a server, and the filter that removes secrets from its texts.
+/// Pooled connections to a server, and its key.
 #[derive(Debug, Clone)]
 pub(in crate::ask) struct Connection {
     pub(in crate::ask) base: BaseUrl,
-    pub(in crate::ask) scrub: Scrub,
+    /// The key, and the filter that removes it.
+    key: Arc<AccountKey>,
     client: Client,
     timeout: Duration,
     /// Variable that sets the proxy; `None` without a proxy.
@@ -143,6 +145,16 @@ impl HttpResponse {
     }
 }
 
+/// The failure of a request without a response, after this time. A connection that is lost after a long silence was closed by a gateway.
+fn lost_after(error: AskError, time: Duration) -> AskError {
+    let is_lost = error.failure.kind == FailureKind::Connection && error.may_have_effect;
+    if is_lost && time >= LONG_SILENCE {
+        error.with_unfinished(Unfinished::GatewayTimeout)
+    } else {
+        error
+    }
+}
+
 impl Connection {
     /// Prepares connections to an endpoint; nothing is sent yet.
     pub(super) fn new(access: &Access, scrub: Scrub, timeout: Duration) -> Result<Self> {
@@ -150,14 +162,40 @@ impl Connection {
             proxy: proxy_variable(&access.base, |name| std::env::var_os(name))?,
             client: access.client(timeout, &scrub)?,
             base: access.base.clone(),
-            scrub,
+            key: Arc::new(AccountKey::new(access.clone(), scrub)),
             timeout,
             has_answered: Arc::default(),
         })
     }
 
-    /// Sends a JSON body to a path below the base URL.
+    /// Filter that removes the keys and passwords of the endpoint from text of the server.
+    pub(in crate::ask) fn scrub(&self) -> Arc<Scrub> {
+        self.key.scrub()
+    }
+
+    /// Sends a JSON body to a path below the base URL, and again if the server refuses the key and its file has another one.
     pub(super) async fn post(
+        &self,
+        path: &str,
+        headers: &HeaderMap,
+        body: &RequestBody,
+        deadline: Deadline,
+    ) -> Result<HttpResponse, AskError> {
+        let keyed = self.key.add_to(headers);
+        let response = self.post_once(path, &keyed.headers, body, deadline).await?;
+        if !self.has_new_key(&response, &keyed) {
+            return Ok(response);
+        }
+        let keyed = self.key.add_to(headers);
+        self.post_once(path, &keyed.headers, body, deadline).await
+    }
+
+    /// True if a response refuses the key of its request, and the file of the key has another one.
+    fn has_new_key(&self, response: &HttpResponse, keyed: &KeyedHeaders) -> bool {
+        response.status == StatusCode::UNAUTHORIZED && self.key.renew(keyed)
+    }
+
+    async fn post_once(
         &self,
         path: &str,
         headers: &HeaderMap,
@@ -197,6 +235,27 @@ impl Connection {
         self.client.request(method, url)
     }
 
+    /// Sends a request without a streamed body, and again if the server refuses the key and its file has another one. A request with a
+    /// streamed body is sent once.
+    pub(in crate::ask) async fn exchange_keyed(
+        &self,
+        request: RequestBuilder,
+        headers: &HeaderMap,
+        deadline: Deadline,
+    ) -> Result<HttpResponse, AskError> {
+        let again = request.try_clone();
+        let keyed = self.key.add_to(headers);
+        let request = request.headers(keyed.headers.clone());
+        let response = self.exchange(request, deadline).await?;
+        match again {
+            Some(again) if self.has_new_key(&response, &keyed) => {
+                let keyed = self.key.add_to(headers);
+                self.exchange(again.headers(keyed.headers), deadline).await
+            }
+            _ => Ok(response),
+        }
+    }
+
     /// Sends a request once.
     pub(in crate::ask) async fn exchange(
         &self,
@@ -213,11 +272,17 @@ impl Connection {
         request: RequestBuilder,
     ) -> Result<HttpResponse, AskError> {
         let started = Instant::now();
-        let response = self.run_step(timer, request.send()).await?;
+        let response = self.run_step(timer, request.send()).await;
+        let running_time = started.elapsed().saturating_sub(timer.total.suspended());
+        let response = response.map_err(|error| lost_after(error, running_time))?;
         self.has_answered.store(true, Ordering::Relaxed);
         let status = response.status();
         let headers = response.headers().clone();
         let body = match self.receive(timer, response).await {
+            // A stream is sent while the server works.
+            Err(error) if status.is_success() && timer.deadline.idle.is_some() => {
+                return Err(error.with_unfinished(Unfinished::BrokeOff));
+            }
             Err(error) if status.is_success() => return Err(error),
             // The status of a refusal suffices without its body.
             body => body.unwrap_or_default(),
@@ -258,7 +323,7 @@ impl Connection {
             .into_iter()
             .filter_map(|name| Some(format!("{name} {}", model.get(name)?)))
             .collect();
-        Some(self.scrub.line(&facts.join(", ")))
+        Some(self.scrub().line(&facts.join(", ")))
     }
 
     /// Sends a request once, and writes the body of a successful response to a file of at most `max_bytes` bytes; the body of the returned
@@ -266,12 +331,23 @@ impl Connection {
     pub(in crate::ask) async fn download(
         &self,
         request: RequestBuilder,
+        headers: &HeaderMap,
         to: &Path,
         max_bytes: u64,
     ) -> Result<HttpResponse, AskError> {
         let started = Instant::now();
         let mut timer = AttemptTimer::new(Deadline::download(self.timeout));
+        let again = request.try_clone();
+        let keyed = self.key.add_to(headers);
+        let request = request.headers(keyed.headers.clone());
         let mut response = self.run_step(&mut timer, request.send()).await?;
+        if let Some(again) = again
+            && response.status() == StatusCode::UNAUTHORIZED
+            && self.key.renew(&keyed)
+        {
+            let again = again.headers(self.key.add_to(headers).headers);
+            response = self.run_step(&mut timer, again.send()).await?;
+        }
         let (status, headers) = (response.status(), response.headers().clone());
         let body = if status.is_success() {
             let write_error = |error| {
@@ -362,7 +438,7 @@ impl Connection {
             };
         }
         let lacks_files = lacks_open_files(&error);
-        let text = self.scrub.line(&with_causes(&error.without_url()));
+        let text = self.scrub().line(&with_causes(&error.without_url()));
         if lacks_files {
             let message = format!(
                 "{}: {text}; this process may open no more files: less --concurrency, or more with ulimit -n",

@@ -1,7 +1,7 @@
 //! A server at one or several addresses, with retries and load balancing: [`Endpoint`].
 
 use std::collections::HashMap;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
@@ -12,6 +12,7 @@ use tokio::time::{Instant, sleep, timeout};
 use tracing::{debug, warn};
 
 use super::access::Access;
+use super::attempts::Attempts;
 use super::load_balancer::{Failover, LoadBalancer, ModelIndex};
 use super::replica::Replica;
 use super::sending::Sending;
@@ -19,13 +20,12 @@ use super::url::BaseUrl;
 use crate::ask::batch_api::BatchServer;
 use crate::ask::costs::{Charge, Reservation};
 use crate::ask::failures::{AskError, Reach, Retry};
-use crate::ask::pace::{Gate, Quota, RateLimits};
+use crate::ask::pace::{Gate, HeldBack, Quota, RateLimits};
 use crate::ask::requests::Request;
 use crate::ask::vendors::Vendor;
 use crate::ask::wire_kind::Wire;
 use crate::error::{Error, Result};
-use crate::types::text::counted;
-use crate::types::{FailureKind, LostAttempts, Reply};
+use crate::types::{FailureKind, Reply};
 
 /// Maximum wait between retries if the server does not ask for one; chosen. A server may ask for longer waits.
 const MAX_DELAY: Duration = Duration::from_secs(30);
@@ -36,6 +36,15 @@ const COMPARE_TIMEOUT: Duration = Duration::from_secs(3);
 /// Time without an accepted request after which the user is warned that the run waits; at most half of [`Sending::patience`]. Chosen:
 /// pauses because of limits per minute are mostly shorter.
 const LONG_REFUSAL: Duration = Duration::from_secs(20);
+
+/// Maximum time of a refusal with status 503 by a server that is starting; chosen: such a server does not begin to work on the request.
+const QUICK_REFUSAL: Duration = Duration::from_secs(10);
+
+/// Maximum time between two requests to a server that is starting; chosen: large models load for minutes.
+const MAX_START_DELAY: Duration = Duration::from_secs(5);
+
+/// Phrases for a server that is starting, in lower case.
+const STARTING: [&str; 4] = ["loading", "starting", "warming up", "initializing"];
 
 /// A server of one replica, or of several replicas that serve the same models.
 ///
@@ -53,6 +62,8 @@ pub struct Endpoint {
     closing: watch::Sender<bool>,
     /// True after the first reply or the first warning about a failed connection.
     connection_reported: AtomicBool,
+    /// Number of replies so far.
+    replies: AtomicU64,
     /// True if the user was warned, after the last reply, that the endpoint refuses all requests.
     refusal_reported: AtomicBool,
 }
@@ -98,6 +109,7 @@ impl Endpoint {
             compared: Mutex::default(),
             closing: watch::Sender::new(false),
             connection_reported: AtomicBool::new(false),
+            replies: AtomicU64::new(0),
             refusal_reported: AtomicBool::new(false),
         })
     }
@@ -135,6 +147,21 @@ impl Endpoint {
 
     pub(in crate::ask) fn has_key(&self) -> bool {
         self.replicas[0].has_key()
+    }
+
+    /// Maximum number of retries of a question after charged requests without a reply.
+    pub(in crate::ask) fn paid_retries(&self) -> u32 {
+        self.sending.paid_retries
+    }
+
+    /// Time for which requests had to wait for their turn so far.
+    pub(in crate::ask) fn held_back(&self) -> HeldBack {
+        self.replicas
+            .iter()
+            .map(|replica| &replica.gate)
+            .chain(&self.quota)
+            .map(Gate::held_back)
+            .fold(HeldBack::default(), HeldBack::longest)
     }
 
     /// Headers of every request through this API, for each replica.
@@ -207,8 +234,7 @@ impl Endpoint {
             .with_max_delay(MAX_DELAY)
             .with_max_times(self.sending.retries as usize)
             .build();
-        let mut attempts = 0;
-        let mut lost = LostAttempts::default();
+        let mut attempts = Attempts::with_charged(request.timeouts.charged);
         // Replicas that failed since the last delay, and the last of these failures.
         let (mut avoided, mut failed_over) = (Vec::new(), None::<AskError>);
         let mut retried = None;
@@ -218,16 +244,12 @@ impl Endpoint {
                 Ok(false) => Err(over_budget(retried.take())),
                 Err(closed) => Err(closed),
             };
-            let turn = turn.map_err(|error| {
-                failed_over
-                    .take()
-                    .unwrap_or(error)
-                    .with_attempts(attempts, lost)
-            })?;
-            attempts += 1;
+            let turn = turn.map_err(|error| attempts.end(failed_over.take().unwrap_or(error)))?;
+            attempts.sent += 1;
             if let Some(reservation) = request.reservation {
                 reservation.mark_sent();
             }
+            let started = Instant::now();
             let outcome = self.send(request, turn).await;
             if let Some(reservation) = request.reservation {
                 reservation.settle(match &outcome {
@@ -239,15 +261,24 @@ impl Endpoint {
                 Ok(reply) => {
                     self.connection_reported.store(true, Ordering::Relaxed);
                     self.refusal_reported.store(false, Ordering::Relaxed);
+                    self.replies.fetch_add(1, Ordering::Relaxed);
                     return Ok(Reply {
-                        attempts,
-                        lost,
+                        attempts: attempts.sent,
+                        lost: attempts.lost,
                         ..reply
                     });
                 }
                 Err(failed) => failed,
             };
-            lost = lost.plus(*failed.lost);
+            let took = started.elapsed();
+            let failed = attempts.add(failed, self.replies.load(Ordering::Relaxed));
+            if failed.unfinished.is_timeout() && request.timeouts.asks_otherwise {
+                return Err(attempts.end(failed));
+            }
+            let is_charged_often = attempts.charged() > self.sending.paid_retries;
+            if is_charged_often && failed.unfinished.is_probably_charged() {
+                return Err(attempts.give_up(failed, request.timeouts.remedy));
+            }
             avoided.push(turn.replica);
             if failover == Failover::OtherReplica
                 && self.load_balancer.has_other(request.model, &avoided)
@@ -255,12 +286,13 @@ impl Endpoint {
                 failed_over = Some(failed);
                 continue;
             }
-            if lost.attempts > self.sending.paid_retries {
-                return Err(out_of_paid_retries(failed, lost).with_attempts(attempts, lost));
+            if is_charged_often && !failed.lost.is_none() {
+                return Err(attempts.give_up(failed, request.timeouts.remedy));
             }
+            let failed = self.waiting_for_start(failed, took);
             let (delay, failed) = self.retry_delay(request.model, failed, &mut backoff);
             let Some(delay) = delay else {
-                return Err(failed.with_attempts(attempts, lost));
+                return Err(attempts.end(failed));
             };
             avoided.clear();
             failed_over = None;
@@ -286,6 +318,23 @@ impl Endpoint {
         }
     }
 
+    /// Lets a request wait, without using a retry, for a server that is starting: it answers 503 at once, and either says that it loads
+    /// a model, or has answered no request yet.
+    fn waiting_for_start(&self, mut failed: AskError, took: Duration) -> AskError {
+        let is_unavailable = failed.failure.status == Some(503)
+            && failed.retry == Retry::AfterDelay
+            && took < QUICK_REFUSAL;
+        let is_starting = || {
+            let message = failed.failure.message.to_lowercase();
+            self.replies.load(Ordering::Relaxed) == 0
+                || STARTING.iter().any(|phrase| message.contains(phrase))
+        };
+        if is_unavailable && is_starting() {
+            failed.retry = Retry::WhenAccepted;
+        }
+        failed
+    }
+
     /// Delay until the next attempt, and the error; `None` to give up. If the patience is exhausted, the error states it.
     fn retry_delay(
         &self,
@@ -302,6 +351,11 @@ impl Endpoint {
             }
             // The gate pauses all requests as long as the server asked.
             Retry::WhenAccepted if failed.wait.is_some() => Some(Duration::ZERO),
+            Retry::WhenAccepted if failed.failure.status == Some(503) => {
+                let longest = MAX_START_DELAY.max(self.sending.first_delay);
+                let delay = self.refused_for(model) / 10;
+                Some(delay.clamp(self.sending.first_delay, longest))
+            }
             Retry::WhenAccepted => Some(self.sending.first_delay),
         };
         (delay, failed)
@@ -475,17 +529,6 @@ fn over_budget(last: Option<AskError>) -> AskError {
         return AskError::new(FailureKind::Connection, message);
     };
     failed.failure.message += " (not asked again: --max-cost does not allow it)";
-    failed
-}
-
-/// Error of a request with more charged attempts than `--retries paid` allows.
-fn out_of_paid_retries(mut failed: AskError, lost: LostAttempts) -> AskError {
-    failed.failure.message = format!(
-        "{} ({} charged without a reply, {} tokens; remedies: a larger --max-tokens, --thinking off, or more --retries paid)",
-        failed.failure.message,
-        counted(lost.attempts as usize, "attempt"),
-        lost.usage.total().unwrap_or_default()
-    );
     failed
 }
 

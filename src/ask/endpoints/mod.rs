@@ -1,6 +1,8 @@
 //! Endpoints: their addresses, connections, replicas and settings.
 
 mod access;
+mod account_key;
+mod attempts;
 mod connection;
 mod connection_fault;
 mod custom_certificates;
@@ -10,6 +12,7 @@ mod load_balancer;
 mod proxy;
 mod replica;
 mod sending;
+mod served_model;
 mod server;
 mod time_limit;
 mod url;

@@ -9,8 +9,9 @@ use tracing::debug;
 use super::access::Access;
 use super::connection::{Connection, Deadline, HttpResponse};
 use super::sending::Sending;
+use super::served_model::served_model;
 use super::url::BaseUrl;
-use crate::ask::failures::{ApiError, AskError, Reach, ReplyError, Retry, Unreadable};
+use crate::ask::failures::{ApiError, AskError, Reach, ReplyError, Retry, Unfinished, Unreadable};
 use crate::ask::pace::{Gate, RateLimits, Window, retry_after};
 use crate::ask::requests::Request;
 use crate::ask::secrets::without_secrets;
@@ -112,7 +113,7 @@ impl Replica {
             return Err(self.refusal(status, &api_error, &response, request, sent));
         }
         let reply_error = match wire.reply(&response.body, response.header(CONTENT_TYPE.as_str())) {
-            Ok(reply) => return Ok(self.finish_reply(reply, &response, sent)),
+            Ok(reply) => return Ok(self.finish_reply(reply, &response, request, sent)),
             Err(error) => error,
         };
         let cost = cost_in_headers(&response.headers);
@@ -127,15 +128,16 @@ impl Replica {
             ReplyError::Unreadable(unreadable) => {
                 let limit = request.sent.parameters.limit();
                 if let Some(reply) = truncated_reply(&unreadable, limit) {
-                    return Ok(self.finish_reply(reply, &response, sent));
+                    return Ok(self.finish_reply(reply, &response, request, sent));
                 }
                 let Unreadable {
                     description,
                     usage,
                     finish,
                     is_final,
+                    broke_off,
                 } = *unreadable;
-                let scrub = &self.connection.scrub;
+                let scrub = self.connection.scrub();
                 let message = format!("{} answered with {}", self.base(), scrub.line(&description));
                 AskError {
                     retry: if is_final {
@@ -144,6 +146,11 @@ impl Replica {
                         Retry::AfterDelay
                     },
                     finish: finish.map(|word| scrub.line(&word)),
+                    unfinished: if broke_off {
+                        Unfinished::BrokeOff
+                    } else {
+                        Unfinished::None
+                    },
                     ..AskError::new(FailureKind::Response, message)
                         .with_charge(with_cost(usage, cost))
                 }
@@ -154,17 +161,26 @@ impl Replica {
     }
 
     /// Records the success in the window and the gate, and returns the reply without keys and with its latency.
-    fn finish_reply(&self, reply: Reply, response: &HttpResponse, sent: Instant) -> Reply {
+    fn finish_reply(
+        &self,
+        reply: Reply,
+        response: &HttpResponse,
+        request: &Request<'_>,
+        sent: Instant,
+    ) -> Reply {
         self.window.record_success(response.duration);
         let limits = RateLimits::read(&response.headers, SystemTime::now());
         let tokens = reply.usage.and_then(|usage| usage.total());
         self.gate
             .record_success(sent, tokens, limits, self.sending.max_wait);
-        Reply {
+        let asked = &request.sent.parameters.model;
+        let reply = Reply {
             latency_ms: response.duration.as_millis() as u64,
             usage: with_cost(reply.usage, cost_in_headers(&response.headers)),
-            ..without_secrets(reply, &self.connection.scrub)
-        }
+            served_model: served_model(&response.headers, asked, reply.served_model),
+            ..reply
+        };
+        without_secrets(reply, &self.connection.scrub())
     }
 
     /// Error of a request that the server refused with this status; pauses the gate if the server asks for it.
@@ -212,7 +228,16 @@ impl Replica {
         ));
         failed.may_have_effect = status >= 500 && !is_rejected_unprocessed(status);
         self.pause(pace_status, sent, &mut failed);
-        failed
+        if failed.retry != Retry::AfterDelay {
+            return failed;
+        }
+        let took = response.duration;
+        failed.with_unfinished(Unfinished::of_refusal(
+            status,
+            took,
+            api_error,
+            &response.body,
+        ))
     }
 
     /// Error message for a refused request.
@@ -230,11 +255,11 @@ impl Replica {
             _ => String::new(),
         };
         let mut message = format!("{} answered {status}{error}", self.base());
-        let text = self.connection.scrub.line(&api_error.message);
+        let text = self.connection.scrub().line(&api_error.message);
         if !text.is_empty() {
             message = format!("{message}: {text}");
         }
-        let remedy = self.connection.scrub.line(remedy);
+        let remedy = self.connection.scrub().line(remedy);
         if !remedy.is_empty() {
             message = format!("{message} ({remedy})");
         }
@@ -276,7 +301,9 @@ impl Replica {
 
     /// The server's id of the request, without secrets; empty if the response has none.
     fn request_id(&self, response: &HttpResponse) -> String {
-        self.connection.scrub.line(response.header("x-request-id"))
+        self.connection
+            .scrub()
+            .line(response.header("x-request-id"))
     }
 }
 

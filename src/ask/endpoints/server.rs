@@ -143,6 +143,7 @@ impl AccessArgs {
             replicas.push(Access {
                 vendor,
                 key,
+                key_file: self.api_key_file.clone(),
                 key_header: self.key_header,
                 account: account_headers(vendor),
                 headers: CustomHeaders::read(&self.header, &self.header_env)?,

@@ -311,6 +311,8 @@ pub(in crate::ask) struct Unreadable {
     pub(in crate::ask) finish: Option<String>,
     /// True if the same request would fail in the same way.
     pub(in crate::ask) is_final: bool,
+    /// True if the body has a part of the reply, so that the server has worked on it.
+    pub(in crate::ask) broke_off: bool,
 }
 
 impl Unreadable {

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use super::quota_refusal::QuotaRefusal;
+use super::unfinished::Unfinished;
 use crate::ask::costs::Charge;
 use crate::ask::requests::AdaptableField;
 use crate::types::{Failure, FailureKind, LostAttempts, Usage};
@@ -56,6 +57,8 @@ pub struct AskError {
     pub(crate) wait: Option<Duration>,
     /// True if the request may have had an effect that the server did not report: a charge, a file or a batch.
     pub(crate) may_have_effect: bool,
+    /// Work that the server may have done, and charged, without a statement of tokens.
+    pub(crate) unfinished: Unfinished,
     /// Refusal of a batch because too many tokens are enqueued; `None` for other reasons.
     pub(crate) quota: Option<Box<QuotaRefusal>>,
 }
@@ -79,6 +82,7 @@ impl AskError {
             finish: None,
             retry: Retry::Never,
             wait: None,
+            unfinished: Unfinished::None,
             quota: None,
         }
     }
@@ -95,6 +99,16 @@ impl AskError {
     /// Adds a charged attempt with these tokens.
     pub(in crate::ask) fn with_charge(mut self, usage: Option<Usage>) -> Self {
         self.lost.add(usage);
+        self
+    }
+
+    /// The same failure of a request on which the server may have worked.
+    pub(in crate::ask) fn with_unfinished(mut self, unfinished: Unfinished) -> Self {
+        if unfinished.is_timeout() {
+            self.failure.kind = FailureKind::Timeout;
+            self.may_have_effect = true;
+        }
+        self.unfinished = unfinished;
         self
     }
 

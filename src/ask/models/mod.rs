@@ -5,6 +5,7 @@ mod model;
 mod random;
 mod remote;
 mod script;
+mod stream_fallback;
 
 pub(crate) use local::{Local, LocalAnswer};
 pub use model::Model;

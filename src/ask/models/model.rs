@@ -12,6 +12,7 @@ use crate::ask::batch;
 use crate::ask::batch_api::BatchServer;
 use crate::ask::costs::{Reservation, image_tokens, scaling_image_tokens};
 use crate::ask::failures::AskError;
+use crate::ask::pace::HeldBack;
 use crate::ask::requests::{Call, ChangedSetting, Message, Parameters};
 use crate::error::Result;
 use crate::types::{Digest, Reply};
@@ -102,6 +103,12 @@ impl Model {
     #[must_use]
     pub fn adapted(&self) -> Vec<String> {
         self.remote().map_or_else(Vec::new, Remote::adapted)
+    }
+
+    /// Time for which requests to the model's endpoint had to wait for their turn so far; zero for built-in models.
+    pub(crate) fn held_back(&self) -> HeldBack {
+        self.remote()
+            .map_or_else(HeldBack::default, |model| model.endpoint().held_back())
     }
 
     /// Number of tokens of an image of this width and height, in pixels; `None` if unknown.
@@ -246,19 +253,23 @@ impl Model {
 
     /// Asks one question. Dropping the future abandons the request.
     pub async fn ask(&self, call: Call<'_>) -> Result<Reply, AskError> {
-        self.ask_within(call, None).await
+        self.ask_within(call, None, false).await
     }
 
-    /// Asks one question; the reservation covers the cost of each of its requests.
+    /// Asks one question; the reservation covers the cost of each of its requests. A question that timed out at a gateway in an earlier
+    /// call (`has_timed_out`) is given up at the next timeout.
     pub(crate) async fn ask_within(
         &self,
         call: Call<'_>,
         reservation: Option<&Reservation>,
+        has_timed_out: bool,
     ) -> Result<Reply, AskError> {
         match self {
             Self::Remote(model) => {
                 let choices = call.query.choice_count();
-                model.ask_within(call.message, choices, reservation).await
+                model
+                    .ask_within(call.message, choices, reservation, has_timed_out)
+                    .await
             }
             Self::Random(random) => {
                 let question = call.query.require_choices()?;

@@ -8,15 +8,17 @@ use reqwest::header::HeaderMap;
 use serde_json::{Map, Value};
 use tracing::warn;
 
+use super::stream_fallback::{AskedBefore, StreamFallback};
 use crate::ask::costs::Reservation;
 use crate::ask::endpoints::{Endpoint, ModelIndex};
 use crate::ask::failures::{AskError, Reach};
 use crate::ask::requests::constraint::constrained_letter;
 use crate::ask::requests::{
-    AdaptableField, Constrain, Message, Parameters, Request, RequestFields, SentFields, Thinking,
-    ThinkingBudget, TokenField,
+    AdaptableField, AfterTimeout, Constrain, Message, Parameters, Request, RequestFields,
+    SentFields, Thinking, ThinkingBudget, TokenField,
 };
 use crate::ask::vendors::Vendor;
+use crate::ask::wire_kind::Wire;
 use crate::error::{Error, Result};
 use crate::types::{FailureKind, LostAttempts, Reply};
 
@@ -37,6 +39,7 @@ pub struct Remote {
     forced: Mutex<BTreeSet<&'static str>>,
     /// Outcome of the first question. The other questions wait for it, so that a refusal that concerns all requests costs a single one.
     first_question: tokio::sync::Mutex<FirstQuestion>,
+    streams: StreamFallback,
     /// True after the warning about a reply that does not follow the constraint.
     warned_unconstrained: AtomicBool,
 }
@@ -73,6 +76,7 @@ impl Remote {
             endpoint,
             parameters,
             first_question: tokio::sync::Mutex::new(FirstQuestion::Pending),
+            streams: StreamFallback::default(),
             warned_unconstrained: AtomicBool::new(false),
         })
     }
@@ -125,7 +129,9 @@ impl Remote {
     /// Changes to requests after the server refused a field. Only settings with the value `auto` are adapted, for all further requests.
     #[must_use]
     pub fn adapted(&self) -> Vec<String> {
-        self.fields().changes(self.initial)
+        let mut changes = self.fields().changes(self.initial);
+        changes.extend(self.streams.change());
+        changes
     }
 
     /// Flags of the settings that the server refused: they may change within the run.
@@ -147,23 +153,30 @@ impl Remote {
 
     /// Asks a question with this number of choices; 0 for an open question.
     pub async fn ask(&self, message: Message<'_>, choices: usize) -> Result<Reply, AskError> {
-        self.ask_within(message, choices, None).await
+        self.ask_within(message, choices, None, false).await
     }
 
-    /// Like [`Self::ask`]; the reservation covers the cost of each request.
+    /// Like [`Self::ask`]; the reservation covers the cost of each request. A question that timed out at a gateway in an earlier call
+    /// (`has_timed_out`) is given up at the next timeout.
     pub(super) async fn ask_within(
         &self,
         message: Message<'_>,
         choices: usize,
         reservation: Option<&Reservation>,
+        has_timed_out: bool,
     ) -> Result<Reply, AskError> {
+        let before = if has_timed_out {
+            AskedBefore::timed_out(self.endpoint.paid_retries())
+        } else {
+            AskedBefore::default()
+        };
         let mut first_question = self.first_question.lock().await;
         match &*first_question {
             FirstQuestion::Pending => {}
             FirstQuestion::Ended => {
                 drop(first_question);
                 return self
-                    .ask_adapting(message, choices, reservation)
+                    .ask_adapting(message, choices, reservation, before)
                     .await
                     .map_err(|error| resolve_alike(error, Reach::Trial));
             }
@@ -176,7 +189,7 @@ impl Remote {
             }
         }
         let outcome = self
-            .ask_adapting(message, choices, reservation)
+            .ask_adapting(message, choices, reservation, before)
             .await
             .map_err(|error| resolve_alike(error, Reach::Endpoint));
         *first_question = match &outcome {
@@ -187,34 +200,53 @@ impl Remote {
         outcome
     }
 
-    /// Asks a question, and again after each adaptation of a refused field.
+    /// Asks a question, and again after each adaptation of a refused field, or as a stream after a gateway timeout.
     async fn ask_adapting(
         &self,
         message: Message<'_>,
         choices: usize,
         reservation: Option<&Reservation>,
+        mut before: AskedBefore,
     ) -> Result<Reply, AskError> {
         let (mut attempts, mut lost) = (0, LostAttempts::default());
+        let paid_retries = self.endpoint.paid_retries();
         loop {
             let fields = self.fields();
-            let outcome = self.ask_with(fields, message, choices, reservation).await;
+            let wire = self.streams.wire(&self.parameters, fields.wire, before);
+            let timeouts = self
+                .streams
+                .after_timeout(&self.parameters, wire, before, paid_retries);
+            let sent = RequestFields { wire, ..fields };
+            let outcome = self
+                .ask_with(sent, timeouts, message, choices, reservation)
+                .await;
             if let Err(error) = &outcome {
                 let mut forced = self.forced.lock().unwrap_or_else(PoisonError::into_inner);
                 forced.extend(error.forced);
             }
             match outcome {
-                Err(error) if self.adapt(fields, error.refused_field) => {
+                Err(error) => {
                     attempts += error.attempts;
                     lost = lost.plus(*error.lost);
-                }
-                Err(error) => {
-                    return Err(AskError {
-                        attempts: attempts + error.attempts,
-                        lost: Box::new(lost.plus(*error.lost)),
-                        ..error
-                    });
+                    if self.adapt(fields, error.refused_field) {
+                        continue;
+                    }
+                    let wires = (wire, fields.wire);
+                    let next = self
+                        .streams
+                        .next(self.name(), &error, wires, before, timeouts);
+                    match next {
+                        Some(next) => before = next,
+                        None => return Err(error.with_attempts(attempts, lost)),
+                    }
                 }
                 Ok(reply) => {
+                    if wire != fields.wire {
+                        self.streams.record_reply();
+                        if before.is_too_long() {
+                            self.keep_streams(fields);
+                        }
+                    }
                     return Ok(Reply {
                         text: self.letter_or_text(reply.text, choices),
                         attempts: attempts + reply.attempts,
@@ -257,6 +289,7 @@ impl Remote {
     async fn ask_with(
         &self,
         fields: RequestFields,
+        timeouts: AfterTimeout,
         message: Message<'_>,
         choices: usize,
         reservation: Option<&Reservation>,
@@ -284,9 +317,22 @@ impl Remote {
                 has_key: self.endpoint.has_key(),
             },
             affinity: image_hash(message),
+            timeouts,
             reservation,
         };
         self.endpoint.ask(&request).await
+    }
+
+    /// Asks for streams from now on, unless the fields have changed in the meantime.
+    fn keep_streams(&self, before: RequestFields) {
+        let mut current = self.fields.lock().unwrap_or_else(PoisonError::into_inner);
+        if *current == before {
+            warn!(
+                "{}: its replies are streamed for the rest of the run, because a gateway does not wait for a long one in one piece",
+                self.name()
+            );
+            current.wire = Wire::ChatStream;
+        }
     }
 
     fn fields(&self) -> RequestFields {

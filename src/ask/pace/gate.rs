@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use tokio::time::{Instant, sleep_until};
 
+use super::held_back::{HeldBack, PaceCause};
 use super::learned_rate::LearnedRate;
 use super::quota::{INITIAL_TOKENS, MAX_TOKENS, Quota, QuotaWindow};
 use super::rate_limits::{PaceAdvice, RateLimits};
@@ -29,14 +30,16 @@ pub(in crate::ask) struct Gate {
 struct State {
     quota: QuotaWindow,
     learned: LearnedRate,
-    /// End of the current pause: the endpoint has no capacity, or its reported limits call for a pause.
+    /// End of the current pause, because the endpoint has no capacity.
     paused_until: Instant,
-    /// Earliest time of the next request under `reported_spacing`.
-    spaced_until: Instant,
+    /// Earliest time of the next request under the limits that the endpoint reports.
+    reported_until: Instant,
     /// Time between requests, derived from the limits that the endpoint reports.
     reported_spacing: Duration,
     /// Moving average of tokens per request.
     mean_tokens: f64,
+    /// Time for which requests had to wait so far.
+    held_back: HeldBack,
     /// Time of the first refusal since the last success; `None` without one.
     refused_since: Option<Instant>,
 }
@@ -49,9 +52,10 @@ impl Gate {
                 quota: QuotaWindow::new(quota, now),
                 learned: LearnedRate::new(now, QuotaWindow::half_rate(quota)),
                 paused_until: now,
-                spaced_until: now,
+                reported_until: now,
                 reported_spacing: Duration::ZERO,
                 mean_tokens: INITIAL_TOKENS,
+                held_back: HeldBack::default(),
                 refused_since: None,
             }),
             queue: tokio::sync::Mutex::new(()),
@@ -62,18 +66,19 @@ impl Gate {
     pub(in crate::ask) async fn pass(&self) -> Instant {
         let _turn = self.queue.lock().await;
         loop {
-            let turn = {
-                let now = Instant::now();
+            let now = Instant::now();
+            let (turn, cause) = {
                 let mut state = self.state();
-                let turn = state.next_turn(now);
+                let (turn, cause) = state.next_turn(now);
                 if turn <= now {
                     state.record_sent(now);
                     return now;
                 }
-                turn
+                (turn, cause)
             };
             // Recompute the turn after the sleep: a reply that arrives in the meantime may move it.
             sleep_until(turn).await;
+            self.state().held_back.add(cause, now.elapsed());
         }
     }
 
@@ -81,7 +86,12 @@ impl Gate {
     pub(in crate::ask) fn ready_at(&self) -> Instant {
         let now = Instant::now();
         let mut state = self.state();
-        state.next_turn(now).max(now)
+        state.next_turn(now).0.max(now)
+    }
+
+    /// Time for which the first request of the queue had to wait so far.
+    pub(in crate::ask) fn held_back(&self) -> HeldBack {
+        self.state().held_back
     }
 
     /// Pauses all requests, because the endpoint has no capacity. The learned rate does not change.
@@ -131,7 +141,7 @@ impl Gate {
             PaceAdvice::Pause(wait) => {
                 let until = now.checked_add(wait);
                 if let Some(until) = until.filter(|_| wait <= max_wait) {
-                    state.pause_until(until);
+                    state.reported_until = state.reported_until.max(until);
                 }
                 Duration::ZERO
             }
@@ -144,19 +154,24 @@ impl Gate {
 }
 
 impl State {
-    /// Earliest time at which the next request may be sent.
-    fn next_turn(&mut self, now: Instant) -> Instant {
-        self.quota
-            .next_turn(now)
-            .max(self.learned.next_turn())
-            .max(self.paused_until)
-            .max(self.spaced_until)
+    /// Earliest time at which the next request may be sent, and the cause of the wait until then.
+    fn next_turn(&mut self, now: Instant) -> (Instant, PaceCause) {
+        let refused_until = self.learned.next_turn().max(self.paused_until);
+        let turns = [
+            (self.quota.next_turn(now), PaceCause::Quota),
+            (refused_until, PaceCause::Refusals),
+            (self.reported_until, PaceCause::ReportedLimits),
+        ];
+        turns
+            .into_iter()
+            .reduce(|latest, next| if next.0 > latest.0 { next } else { latest })
+            .unwrap_or((now, PaceCause::Quota))
     }
 
     fn record_sent(&mut self, now: Instant) {
         self.quota.record_sent(now);
         self.learned.record_sent(now);
-        self.spaced_until = now + self.reported_spacing;
+        self.reported_until = now + self.reported_spacing;
     }
 
     fn pause_until(&mut self, until: Instant) {

@@ -5,6 +5,7 @@
 //! flight independently: a long pause must not narrow the window, and a wide window must not shorten a pause.
 
 mod gate;
+mod held_back;
 mod learned_rate;
 mod quota;
 mod rate_limits;
@@ -18,5 +19,8 @@ pub(super) use retry_after::retry_after;
 pub(super) use wait_words::{wait_in_field, wait_in_words};
 pub(super) use window::Window;
 
+pub(crate) use held_back::HeldBack;
+#[cfg(test)]
+pub(crate) use held_back::PaceCause;
 pub use quota::Quota;
 pub(crate) use window::ConcurrencyBounds;

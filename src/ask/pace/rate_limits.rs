@@ -5,6 +5,10 @@ use std::time::{Duration, SystemTime};
 use jiff::{SignedDuration, Timestamp};
 use reqwest::header::HeaderMap;
 
+/// Maximum time until the reset of a limit that spaces requests; chosen. Limits per minute reset within a minute. A limit per hour or day
+/// is a budget: requests need not be spread over the rest of the day.
+const MAX_PERIOD: Duration = Duration::from_mins(2);
+
 /// One rate limit, in requests or in tokens.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct RateLimit {
@@ -102,8 +106,8 @@ fn rate_limit(
 }
 
 impl RateLimit {
-    /// Advice for requests that each use `cost` of the limit: none above half of the limit; below, the remaining amount is spread
-    /// evenly over the time until reset.
+    /// Advice for requests that each use `cost` of the limit: none above half of the limit, or if the limit resets after more than
+    /// [`MAX_PERIOD`]; otherwise the remaining amount is spread evenly over the time until reset.
     ///
     /// If the limit refills continuously (OpenAI), requests at half of the limit match the refill rate, and slow down below, so the
     /// remaining amount settles at half. If it refills at the end of each minute, the remaining amount lasts until then.
@@ -113,6 +117,9 @@ impl RateLimit {
         }
         if self.remaining < cost {
             return PaceAdvice::Pause(self.reset);
+        }
+        if self.reset > MAX_PERIOD {
+            return PaceAdvice::Nothing;
         }
         let spacing = self.reset.as_secs_f64() * cost / self.remaining;
         PaceAdvice::Spacing(Duration::try_from_secs_f64(spacing).unwrap_or(Duration::MAX))
@@ -234,6 +241,31 @@ mod tests {
         assert_eq!(
             tokens.advice(20_000.0),
             PaceAdvice::Pause(Duration::from_secs(30))
+        );
+    }
+
+    #[test]
+    fn daily_limits_space_no_requests() {
+        let groq = |remaining: &'static str, reset: &'static str| {
+            read(&[
+                ("x-ratelimit-limit-requests", "14400"),
+                ("x-ratelimit-remaining-requests", remaining),
+                ("x-ratelimit-reset-requests", reset),
+                ("x-ratelimit-limit-tokens", "30000"),
+                ("x-ratelimit-remaining-tokens", "29000"),
+                ("x-ratelimit-reset-tokens", "2s"),
+            ])
+            .advice(1000.0)
+        };
+        assert_eq!(groq("14370", "2m59.56s"), PaceAdvice::Nothing);
+        assert_eq!(groq("5000", "15h40m0s"), PaceAdvice::Nothing);
+        assert_eq!(groq("3", "23h59m42s"), PaceAdvice::Nothing);
+        let none = Duration::from_hours(24);
+        assert_eq!(groq("0", "24h0m0s"), PaceAdvice::Pause(none));
+        // The same numbers as a limit per minute.
+        assert_eq!(
+            groq("100", "50s"),
+            PaceAdvice::Spacing(Duration::from_millis(500))
         );
     }
 

@@ -28,7 +28,7 @@ pub(crate) use image_limit::ImageLimit;
 pub(super) use judge::for_judge;
 pub(crate) use parameters::by_flag;
 pub use parameters::{Constrain, ImageDetail, Parameters, SettingsOrigin, Temperature};
-pub(super) use request::Request;
+pub(super) use request::{AfterTimeout, Request};
 pub(super) use request_body::RequestBody;
 pub(super) use temperature_range::least_temperature;
 pub use thinking::Thinking;

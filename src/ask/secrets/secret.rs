@@ -118,6 +118,11 @@ impl Scrub {
         Self { secrets, parts }
     }
 
+    /// This filter, which also removes another secret.
+    pub(in crate::ask) fn with(&self, secret: String) -> Self {
+        Self::new(self.secrets.iter().cloned().chain([secret]))
+    }
+
     /// True if there are no secrets to remove.
     pub(in crate::ask) fn is_empty(&self) -> bool {
         self.secrets.is_empty()

@@ -68,10 +68,14 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, ReplyError>
 /// Parses a completion from JSON or an event stream.
 fn parse(text: &str, content_type: &str) -> Result<Value, ReplyError> {
     if stream::is_stream(text, content_type) {
-        return stream::assemble(text).map_err(|usage| {
+        return stream::assemble(text).map_err(|broken| {
             let description = "an event stream without a complete chat completion";
-            let usage = usage::alone(usage);
-            Unreadable::new(description).with_usage(usage).into()
+            Unreadable {
+                usage: usage::alone(broken.usage),
+                broke_off: broken.has_text,
+                ..Unreadable::new(description)
+            }
+            .into()
         });
     }
     json_body::parse_body(text, content_type)

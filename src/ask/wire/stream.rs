@@ -25,16 +25,40 @@ pub(super) fn events(stream: &str) -> impl Iterator<Item = Value> {
         .map(|data| parse(data).unwrap_or_default())
 }
 
+/// True if a stream has the event `[DONE]`, which servers send last.
+fn is_done(stream: &str) -> bool {
+    stream
+        .split(['\n', '\r'])
+        .filter_map(|line| line.strip_prefix("data:"))
+        .any(|data| data.trim() == "[DONE]")
+}
+
+/// An event stream without a complete chat completion.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub(super) struct BrokenStream {
+    /// Token usage, if the stream has it.
+    pub(super) usage: Option<Value>,
+    /// True if the stream has a part of the reply, so that the server has worked on it.
+    pub(super) has_text: bool,
+}
+
 /// Joins the chunks of the choice with index 0 to a completion in the form of an unstreamed one. An error event is returned in its place.
 ///
+/// A stream is complete if it has a finish reason. Some gateways send none: then it is complete if it has a part of the reply and ends
+/// with `[DONE]`, or with the final token counts, which follow the last token.
+///
 /// # Errors
-/// If the stream is not a chat completion, or is truncated: it has no finish reason. The error is the usage, if the stream has one.
-pub(super) fn assemble(stream: &str) -> Result<Value, Option<Value>> {
+/// If the stream is not a chat completion, or is truncated.
+pub(super) fn assemble(stream: &str) -> Result<Value, BrokenStream> {
     let mut completion = Map::new();
     let mut joined = JoinedChoice::default();
+    let mut ends_with_counts = false;
     for event in events(stream) {
         if event.is_null() {
-            return Err(completion.remove("usage"));
+            return Err(BrokenStream {
+                usage: completion.remove("usage"),
+                has_text: joined.has_text(),
+            });
         }
         if let Some(error) = error_event(&event) {
             return Ok(error);
@@ -50,6 +74,7 @@ pub(super) fn assemble(stream: &str) -> Result<Value, Option<Value>> {
             .into_iter()
             .flatten()
             .find(|choice| choice.get("index").is_none_or(|index| *index == 0));
+        ends_with_counts = choice.is_none() && states_tokens(&event);
         if let Some(choice) = choice {
             // Some gateways put an error into the choice.
             if choice.get("error").is_some_and(|error| !error.is_null()) {
@@ -58,13 +83,24 @@ pub(super) fn assemble(stream: &str) -> Result<Value, Option<Value>> {
             joined.add(choice);
         }
     }
-    match joined.finish() {
-        Some(choice) => {
-            completion.insert("choices".to_owned(), json!([choice]));
-            Ok(Value::Object(completion))
-        }
-        None => Err(completion.remove("usage")),
+    let has_text = joined.has_text();
+    let is_complete = joined.is_finished() || (has_text && (ends_with_counts || is_done(stream)));
+    if !is_complete {
+        return Err(BrokenStream {
+            usage: completion.remove("usage"),
+            has_text,
+        });
     }
+    completion.insert("choices".to_owned(), json!([joined.into_choice()]));
+    Ok(Value::Object(completion))
+}
+
+/// True if an event states a number of reply tokens other than 0.
+fn states_tokens(event: &Value) -> bool {
+    ["completion_tokens", "output_tokens"]
+        .iter()
+        .filter_map(|field| event.get("usage")?.get(field)?.as_u64())
+        .any(|tokens| tokens > 0)
 }
 
 /// The error in an event, in the form of an error body; `None` without one.
@@ -135,11 +171,24 @@ impl JoinedChoice {
         }
     }
 
-    /// The complete choice; `None` if the last chunk, with the finish reason, is missing.
-    fn finish(self) -> Option<Value> {
-        if self.finish_reason.is_null() {
-            return None;
+    /// True if a chunk had a finish reason; some gateways send an empty one with each chunk.
+    fn is_finished(&self) -> bool {
+        match &self.finish_reason {
+            Value::String(reason) => !reason.trim().is_empty(),
+            reason => !reason.is_null(),
         }
+    }
+
+    /// True if a chunk had a part of the reply or of the reasoning before it.
+    fn has_text(&self) -> bool {
+        self.content
+            .iter()
+            .chain(self.texts.values())
+            .any(|part| part != "")
+    }
+
+    /// The choice; its finish reason is null if no chunk had one.
+    fn into_choice(self) -> Value {
         let mut message = self.texts;
         match <[Value; 1]>::try_from(self.content) {
             Ok([text @ Value::String(_)]) => message.insert("content".to_owned(), text),
@@ -152,7 +201,7 @@ impl JoinedChoice {
         if !self.logprobs.is_empty() {
             choice["logprobs"] = self.logprobs.into();
         }
-        Some(choice)
+        choice
     }
 }
 
@@ -190,14 +239,28 @@ mod tests {
     #[test]
     fn incomplete_streams_are_errors() {
         let piece = "data: {\"choices\":[{\"index\":0,\"delta\":{\"content\":\"B\"}}]}\n\n";
-        assert_eq!(assemble(piece), Err(None));
-        let usage = "data: {\"choices\":[],\"usage\":{\"prompt_tokens\":3}}\n\n";
-        let cut = assemble(&format!("{piece}{usage}data: [DONE]"));
-        assert_eq!(cut, Err(Some(json!({"prompt_tokens": 3}))));
-        assert_eq!(assemble(&format!("{piece}data: {{\"choi")), Err(None));
-        assert_eq!(assemble(&format!("{piece}data: [DONE]")), Err(None));
-        assert_eq!(assemble("data: [DONE]\n\n"), Err(None));
-        assert_eq!(assemble(": keep-alive\n\n"), Err(None));
+        let broken = |usage, has_text| Err(BrokenStream { usage, has_text });
+        assert_eq!(assemble(piece), broken(None, true));
+        let prompt = "data: {\"choices\":[],\"usage\":{\"prompt_tokens\":3}}\n\n";
+        let cut = assemble(&format!("{prompt}{piece}"));
+        assert_eq!(cut, broken(Some(json!({"prompt_tokens": 3})), true));
+        let counts = "data: {\"choices\":[],\"usage\":{\"completion_tokens\":3}}\n\n";
+        assert!(
+            assemble(&format!("{counts}{piece}")).is_err(),
+            "counts so far"
+        );
+        assert_eq!(
+            assemble(&format!("{piece}data: {{\"choi")),
+            broken(None, true)
+        );
+        let role = "data: {\"choices\":[{\"index\":0,\"delta\":{\"content\":\"\"}}]}\n\n";
+        for empty in ["", ": keep-alive\n\n", "data: [DONE]\n\n", role] {
+            assert_eq!(assemble(empty), broken(None, false), "{empty}");
+        }
+        assert_eq!(
+            assemble(&format!("{role}data: [DONE]\n\n")),
+            broken(None, false)
+        );
         let error = "data: {\"error\":{\"message\":\"overloaded\"}}\n\n";
         assert_eq!(
             assemble(&format!("{piece}{error}")).unwrap()["error"]["message"],
@@ -208,6 +271,27 @@ mod tests {
             assemble(&format!("{piece}{error}")).unwrap()["error"]["message"],
             "overloaded"
         );
+    }
+
+    #[test]
+    fn streams_without_a_finish_reason_are_complete_at_their_end() {
+        let chunk = |finish: &str| {
+            format!(
+                "data: {{\"choices\":[{{\"index\":0,\"delta\":{{\"content\":\"B\"}}{finish}}}]}}\n\n"
+            )
+        };
+        let done = "data: [DONE]\n\n";
+        let counts = "data: {\"choices\":[],\"usage\":{\"completion_tokens\":1}}\n\n";
+        for finish in ["", ",\"finish_reason\":null", ",\"finish_reason\":\"\""] {
+            for end in [done.to_owned(), counts.to_owned(), [counts, done].concat()] {
+                let joined = assemble(&format!("{}{end}", chunk(finish))).unwrap();
+                let choice = &joined["choices"][0];
+                assert_eq!(choice["message"]["content"], "B", "{finish} {end}");
+            }
+            assert!(assemble(&chunk(finish)).is_err(), "{finish}");
+        }
+        let thought = "data: {\"choices\":[{\"delta\":{\"reasoning\":\"A\"}}]}\n\n";
+        assert!(assemble(&format!("{thought}{done}")).is_ok());
     }
 
     fn piece(content: &str, token: &str, finish: &str) -> String {

@@ -1,5 +1,5 @@
-//! Alerts about requests that were changed because a server refused a field, by the program ([`adaptation_alerts`]) and by the user
-//! ([`change_alerts`]).
+//! Alerts about requests that were changed because a server refused or did not answer the first, by the program ([`adaptation_alerts`]) and
+//! by the user ([`change_alerts`]).
 
 use serde_json::Value;
 
@@ -32,7 +32,7 @@ pub(super) fn adaptation_alerts(runs: &[JoinedRun]) -> Vec<Alert> {
                 _ => format!(" in {}", run.name),
             };
             let text = format!(
-                "Requests to {model} were changed{place}, because the server refused what was sent first: {}.",
+                "Requests to {model} were changed{place}, because what was sent first was refused or not answered in time: {}.",
                 joined_with_and(&changes)
             );
             alerts.push(Alert::new(AlertKind::Parameters, text));

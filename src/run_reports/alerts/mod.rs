@@ -11,6 +11,7 @@ mod parsing;
 mod providers;
 mod questions;
 mod replies;
+mod served;
 mod servers;
 mod settings;
 mod words;
@@ -166,6 +167,7 @@ pub(super) fn run_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     let mut alerts = progress_alerts(&joined.runs);
     alerts.extend(cost_alerts(&joined.runs));
     alerts.extend(servers::server_alerts(joined));
+    alerts.extend(served::served_alerts(joined));
     alerts.extend(providers::provider_alerts(&joined.trials));
     alerts.extend(limits::limit_alerts(joined));
     alerts.extend(enhancer_alerts(&joined.runs));

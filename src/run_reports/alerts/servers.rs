@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::served::has_several;
 use super::words::{difference_sentence, run_names};
 use crate::run_reports::join::Joined;
 use crate::run_reports::settings::{
@@ -27,7 +28,9 @@ pub(super) fn server_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     let mut alerts = Vec::new();
     for (model, runs) in &served {
         let distinct: BTreeSet<&String> = runs.values().copied().flatten().collect();
-        if distinct.len() > 1 {
+        // Names that change within a run have their own alert.
+        let is_mixed = runs.values().any(|names| has_several(names));
+        if distinct.len() > 1 && !is_mixed {
             let runs: Vec<String> = runs
                 .iter()
                 .map(|(run, served)| {

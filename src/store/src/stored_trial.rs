@@ -2,11 +2,10 @@
 
 use std::num::NonZeroU32;
 
-use serde::de::IgnoredAny;
 use serde::{Deserialize, Deserializer};
 
 use darkqa_ground::types::records::{SmallNumber, Tokens};
-use darkqa_ground::types::{Finish, LostAttempts, Shared, TrialKey, Usage, Via};
+use darkqa_ground::types::{FailureKind, Finish, LostAttempts, Shared, TrialKey, Usage, Via};
 
 /// A trial of a run, without question and answer: 72 bytes.
 #[derive(Debug, Clone, Deserialize)]
@@ -18,7 +17,7 @@ pub struct StoredTrial {
     /// The way in which the model was asked.
     #[serde(default)]
     pub via: Via,
-    failure: Option<IgnoredAny>,
+    failure: Option<StoredFailure>,
     #[serde(default, rename = "finish", deserialize_with = "is_length")]
     is_truncated: bool,
     /// The token limit of the reply, if it differs from that of the run's first call.
@@ -31,10 +30,40 @@ pub struct StoredTrial {
     lost: Option<Box<LostAttempts>>,
 }
 
+/// A failure, by how the trial is asked again.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(from = "FailureFacts")]
+enum StoredFailure {
+    /// A gateway gave up on the request.
+    GatewayTimeout,
+    Other,
+}
+
+/// The fields of a failure that tell a timeout of a gateway, which has a status, from one of this program.
+#[derive(Debug, Deserialize)]
+struct FailureFacts {
+    kind: Option<FailureKind>,
+    status: Option<u16>,
+}
+
+impl From<FailureFacts> for StoredFailure {
+    fn from(failure: FailureFacts) -> Self {
+        match (failure.kind, failure.status) {
+            (Some(FailureKind::Timeout), Some(_)) => Self::GatewayTimeout,
+            _ => Self::Other,
+        }
+    }
+}
+
 impl StoredTrial {
     /// True if no reply came, so that the trial is asked again.
     pub fn failed(&self) -> bool {
         self.failure.is_some()
+    }
+
+    /// True if a gateway gave up on the request, so that the server may have charged it.
+    pub fn timed_out_at_gateway(&self) -> bool {
+        self.failure == Some(StoredFailure::GatewayTimeout) && self.via == Via::Direct
     }
 
     /// True if the reply was truncated at a token limit below this one; `first` is that of the run's first call.
@@ -105,6 +134,22 @@ mod tests {
         let key = "0".repeat(32);
         let line = format!(r#"{{"key":"{key}","model":"m","failure":{failure},"lost":{lost}}}"#);
         serde_json::from_str(&line).unwrap()
+    }
+
+    #[test]
+    fn only_gateways_state_a_status_with_a_timeout() {
+        for (failure, expected) in [
+            (r#"{"kind":"timeout","status":504,"message":"m"}"#, true),
+            (r#"{"kind":"timeout","status":null,"message":"m"}"#, false),
+            (r#"{"kind":"server","status":504,"message":"m"}"#, false),
+            ("null", false),
+        ] {
+            assert_eq!(
+                trial(failure, 1).timed_out_at_gateway(),
+                expected,
+                "{failure}"
+            );
+        }
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 mod ask;
 mod faults;
+mod gateways;
 mod money;
 mod money_simulation;
 mod own_requests;

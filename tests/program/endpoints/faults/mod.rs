@@ -2,6 +2,7 @@
 //! requests and the time waited.
 mod failures;
 mod fields;
+mod gateways;
 mod replies;
 mod retries;
 mod vendors;

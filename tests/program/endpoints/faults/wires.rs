@@ -165,7 +165,6 @@ fn broken_stream_is_asked_again() {
     let error = r#"{"error":{"message":"overloaded","code":529}}"#;
     let broken = [
         stream(&[&piece]),
-        stream(&[&piece, "[DONE]"]),
         stream(&[&piece, error]),
         stream(&[&piece, "{\"choi"]),
         streamed(&["A"]).cut(60),

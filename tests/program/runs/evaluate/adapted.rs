@@ -35,7 +35,7 @@ fn refused_field_is_reported() {
     assert_eq!(manifest(&bench)["settings"]["adapted for m"], noted);
     insta::assert_snapshot!(
         lines_with(&printed, "Requests"),
-        @"! Requests to m were changed, because the server refused what was sent first: no"
+        @"! Requests to m were changed, because what was sent first was refused or not"
     );
     // A run in which nothing was refused says nothing of it.
     let other = Bench::with_questions(3);

@@ -4,6 +4,7 @@ mod count;
 mod escape;
 #[cfg(feature = "program")]
 pub mod image_mark;
+pub mod model_names;
 pub mod near_name;
 mod shell;
 mod toml_fault;
