@@ -11,7 +11,7 @@ use tokio::sync::watch;
 use tokio::task::{JoinError, JoinSet};
 use tokio::time::timeout;
 
-use crate::ask::{AskError, Call, Reach, Reservation, sleep_running};
+use crate::ask::{AskError, Reach, sleep_running};
 use crate::engine::circuit_breaker::{CircuitBreaker, EndReason};
 use crate::engine::costs::{
     Budget, BudgetNotes, InFlightCost, MeasuredTokens, Permit, text_tokens,
@@ -20,6 +20,8 @@ use crate::engine::first_failures::FirstFailures;
 use crate::engine::interrupt::Interrupt;
 use crate::engine::lanes::{Lanes, PreparedTrial};
 use crate::engine::models::ModelUnderTest;
+use crate::engine::refusals::Refusals;
+use crate::engine::sending::{Finished, send};
 use crate::engine::settings::JobSettings;
 use crate::engine::suspects::Suspects;
 use crate::engine::truncation::TruncationCheck;
@@ -31,7 +33,7 @@ use crate::images::timings::{TimedStep, Timings};
 use crate::images::trials::{Item, PreparedGroup, Trial};
 use crate::images::workers::thread_start_error;
 use crate::store::Store;
-use crate::types::{Digest, FailureKind, Finish, LostAttempts, Record, Reply, SetLight};
+use crate::types::{Digest, FailureKind, Finish, Record, Reply, SetLight};
 use darkqa_score::answers::record::answered;
 use darkqa_score::answers::{ImageDependence, LitReply};
 
@@ -58,9 +60,6 @@ pub(crate) struct TrialCounts {
     pub(crate) answered: usize,
 }
 
-/// One trial, with its reply or error.
-type Finished<I> = (PreparedTrial<I>, Result<Reply, AskError>);
-
 impl Dispatcher<'_> {
     /// Asks the trials of the groups that `make` sends. `make` runs on a separate thread until the channel is closed. `stoppers` cancel
     /// enhancements in progress.
@@ -83,6 +82,7 @@ impl Dispatcher<'_> {
             bar: self.progress.trials(counts.trials, counts.answered),
             breaker: self.breaker(),
             suspects: Suspects::default(),
+            refusals: Refusals::new(self.models.len()),
             not_asked: BTreeMap::new(),
             budget,
             stoppers,
@@ -131,6 +131,8 @@ struct ReplySink<'a, I: Item> {
     breaker: CircuitBreaker,
     /// Images for which the server fails repeatedly.
     suspects: Suspects,
+    /// Refused trials that wait for another answer.
+    refusals: Refusals<I>,
     /// Number of trials by frame or walk that were not asked because the server fails for it.
     not_asked: BTreeMap<String, usize>,
     budget: Budget,
@@ -199,12 +201,15 @@ impl<I: Item> ReplySink<'_, I> {
             if in_flight.is_empty() && !lanes.is_empty() {
                 self.breaker.over_budget();
             }
-            if !more_groups && lanes.is_empty() && in_flight.is_empty() && lanes.has_deferred() {
+            let all_asked = !more_groups && lanes.is_empty() && in_flight.is_empty();
+            if all_asked && lanes.has_deferred() {
                 lanes.requeue_deferred();
                 self.suspects.start_deferred();
                 continue;
             }
-            let all_asked = !more_groups && lanes.is_empty() && in_flight.is_empty();
+            if all_asked && !self.breaker.stopped() && lanes.requeue(self.refusals.release_last()) {
+                continue;
+            }
             if all_asked || self.breaker.stopped() {
                 break;
             }
@@ -227,6 +232,7 @@ impl<I: Item> ReplySink<'_, I> {
                         lanes.ended(ready.trial.model);
                     }
                     self.store_result(done)?;
+                    lanes.requeue(self.refusals.take_released());
                 }
                 group = groups.recv(), if wants_more => match group {
                     Some(group) => {
@@ -244,6 +250,9 @@ impl<I: Item> ReplySink<'_, I> {
         if self.breaker.stopped() {
             self.stoppers.iter().for_each(EnhancerStopper::stop);
             self.drain(in_flight, interrupt, grace).await?;
+        }
+        for (ready, refused) in self.refusals.take_rest(!self.breaker.stopped()) {
+            self.store_settled(ready, refused)?;
         }
         for (source, trials) in &self.not_asked {
             tracing::warn!(
@@ -474,16 +483,38 @@ impl<I: Item> ReplySink<'_, I> {
             Err(aborted) if aborted.is_cancelled() => return Ok(()),
             Err(panic) => std::panic::resume_unwind(panic.into_panic()),
         };
-        let trial = &ready.trial;
+        let model = ready.trial.model;
         // Zero attempts: the image could not be made, and nothing was sent.
         let attempts = match &result {
             Ok(reply) => reply.attempts,
             Err(error) => error.attempts,
         };
         if attempts > 0 {
-            self.first_questions[trial.model] = FirstQuestion::Ended;
+            self.first_questions[model] = FirstQuestion::Ended;
         }
-        self.limits.warn_exceeded(trial.model, &self.budget);
+        self.limits.warn_exceeded(model, &self.budget);
+        match result {
+            Err(refused) if self.refusals.must_wait(&ready, &refused) => {
+                self.breaker
+                    .refused(model, &refused, ready.trial.item.source());
+                self.refusals.add(ready, refused);
+            }
+            result => {
+                for (ready, result) in self.refusals.settle((ready, result)) {
+                    self.store_settled(ready, result)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Stores the reply or the failure of one trial, once a refusal is known to concern the trial or the run.
+    fn store_settled(
+        &mut self,
+        ready: PreparedTrial<I>,
+        result: Result<Reply, AskError>,
+    ) -> Result<()> {
+        let trial = &ready.trial;
         match &result {
             Ok(_) => {
                 self.breaker.succeeded(trial.model);
@@ -502,11 +533,16 @@ impl<I: Item> ReplySink<'_, I> {
                 let may_be_cause = self.suspects.may_be_cause(trial.model, source);
                 self.breaker
                     .failed(trial.model, error, source, may_be_cause);
-                if error.reach == Reach::Trial {
+                let concerns_all = match error.reach {
+                    Reach::Trial => false,
+                    Reach::ByStatus => self.breaker.is_stopped(trial.model),
+                    _ => true,
+                };
+                if !concerns_all {
                     self.first_failures.add(trial.model, source, &error.failure);
                 }
                 // If the endpoint is the cause or the run ends, the trial does not count as asked, unless it cost something.
-                if error.reach != Reach::Trial && error.lost.is_none() {
+                if concerns_all && error.lost.is_none() {
                     return Ok(());
                 }
             }
@@ -554,46 +590,4 @@ impl<I: Item> ReplySink<'_, I> {
             tracing::warn!("{}", found.words(&model.name));
         }
     }
-}
-
-/// Sends one trial to its model, unless it is given up first. Returns the trial with its reply or error, including the cost of lost
-/// attempts.
-async fn send<I: Item>(
-    model: ModelUnderTest,
-    ready: PreparedTrial<I>,
-    permit: Permit,
-    mut given_up: watch::Receiver<bool>,
-) -> Finished<I> {
-    let PreparedTrial { trial, stimulus } = &ready;
-    let call = Call {
-        query: trial.item.query(),
-        condition: stimulus.condition.as_ref(),
-        message: trial.prompt.message(&stimulus.images),
-        turn: trial.item.turn(),
-    };
-    let reservation = match &permit {
-        Permit::Reserved(reservation) => Some(&**reservation),
-        Permit::Free | Permit::Refused => None,
-    };
-    let asked = tokio::select! {
-        biased;
-        result = model.model.ask_within(call, reservation) => Some(result),
-        _ = given_up.wait_for(|given_up| *given_up) => None,
-    };
-    let charged = reservation.map_or_else(LostAttempts::default, Reservation::charged);
-    let result = match asked {
-        Some(Ok(mut reply)) => {
-            reply.lost.unstated = charged.unstated;
-            Ok(reply)
-        }
-        Some(Err(mut error)) => {
-            error.lost.unstated = charged.unstated;
-            Err(error)
-        }
-        None => Err(AskError {
-            lost: Box::new(charged),
-            ..AskError::given_up()
-        }),
-    };
-    (ready, result)
 }

@@ -255,7 +255,7 @@ impl Endpoint {
                 failed_over = Some(failed);
                 continue;
             }
-            if lost.attempts > self.sending.paid_retries {
+            if request.paid_before + lost.attempts > self.sending.paid_retries {
                 return Err(out_of_paid_retries(failed, lost).with_attempts(attempts, lost));
             }
             let (delay, failed) = self.retry_delay(request.model, failed, &mut backoff);
@@ -415,6 +415,16 @@ impl Endpoint {
                 request.sent.parameters.model
             );
         }
+    }
+
+    /// Waits before a question is asked again whose reply does not count, at most until the endpoint is closed.
+    pub(in crate::ask) async fn wait_to_ask_again(&self) {
+        self.sleep_unless_closed(self.sending.first_delay).await;
+    }
+
+    /// True if a question may be asked again after this many charged attempts without a reply that counts.
+    pub(in crate::ask) fn may_pay_again(&self, paid: u32) -> bool {
+        paid <= self.sending.paid_retries
     }
 
     /// Sleeps for a time, at most until the endpoint is closed.

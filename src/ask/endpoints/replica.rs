@@ -10,7 +10,10 @@ use super::access::Access;
 use super::connection::{Connection, Deadline, HttpResponse};
 use super::sending::Sending;
 use super::url::BaseUrl;
-use crate::ask::failures::{ApiError, AskError, Reach, ReplyError, Retry, Unreadable};
+use crate::ask::failures::{
+    ApiError, AskError, Reach, Refusal, ReplyError, Retry, Unreadable, implied_status,
+    is_out_of_tokens,
+};
 use crate::ask::pace::{Gate, RateLimits, Window, retry_after};
 use crate::ask::requests::Request;
 use crate::ask::secrets::without_secrets;
@@ -18,7 +21,7 @@ use crate::ask::vendors::Vendor;
 use crate::ask::wire::body_usage;
 use crate::ask::wire_kind::Wire;
 use crate::error::Result;
-use crate::types::{FailureKind, Finish, Reply};
+use crate::types::{FailureKind, Finish, Reply, Usage};
 
 /// One address of an endpoint, with its key, pooled connections, rate limiter and concurrency window.
 #[derive(Debug)]
@@ -109,17 +112,20 @@ impl Replica {
             if response.status.is_redirection() {
                 api_error.message = format!("moved to {}", response.header(LOCATION.as_str()));
             }
-            return Err(self.refusal(status, &api_error, &response, request, sent));
+            return self.reply_or_refusal(status, &api_error, &response, request, sent);
         }
         let reply_error = match wire.reply(&response.body, response.header(CONTENT_TYPE.as_str())) {
             Ok(reply) => return Ok(self.finish_reply(reply, &response, sent)),
             Err(error) => error,
         };
         let mut failed = match reply_error {
-            // An error without a code is a temporary failure of the server.
             ReplyError::Api(api_error) => {
-                let code = api_error.status().unwrap_or(500);
-                self.refusal(code, &api_error, &response, request, sent)
+                let implied = implied_status(&api_error);
+                let refused = self.reply_or_refusal(implied, &api_error, &response, request, sent);
+                match refused {
+                    Ok(reply) => return Ok(reply),
+                    Err(failed) => failed,
+                }
             }
             ReplyError::Unreadable(unreadable) => {
                 let limit = request.sent.parameters.limit();
@@ -130,16 +136,11 @@ impl Replica {
                     description,
                     usage,
                     finish,
-                    is_final,
                 } = *unreadable;
                 let scrub = &self.connection.scrub;
                 let message = format!("{} answered with {}", self.base(), scrub.line(&description));
                 AskError {
-                    retry: if is_final {
-                        Retry::Never
-                    } else {
-                        Retry::AfterDelay
-                    },
+                    retry: Retry::AfterDelay,
                     finish: finish.map(|word| scrub.line(&word)),
                     ..AskError::new(FailureKind::Response, message).with_charge(usage)
                 }
@@ -162,6 +163,23 @@ impl Replica {
         }
     }
 
+    /// Error of a request that the server refused with this status; or an empty truncated reply, if the server says that it generated up to
+    /// the token limit.
+    fn reply_or_refusal(
+        &self,
+        status: u16,
+        api_error: &ApiError,
+        response: &HttpResponse,
+        request: &Request<'_>,
+        sent: Instant,
+    ) -> Result<Reply, AskError> {
+        if is_out_of_tokens(status, api_error) {
+            let usage = body_usage(&String::from_utf8_lossy(&response.body));
+            return Ok(self.finish_reply(empty_truncated(usage), response, sent));
+        }
+        Err(self.refusal(status, api_error, response, request, sent))
+    }
+
     /// Error of a request that the server refused with this status; pauses the gate if the server asks for it.
     fn refusal(
         &self,
@@ -172,6 +190,7 @@ impl Replica {
         sent: Instant,
     ) -> AskError {
         let mut failed = AskError::refused(status, api_error, request.wire, request.sent);
+        let may_be_content = failed.may_be_content(status);
         let is_retryable = match response.header("x-should-retry") {
             "true" => true,
             "false" => false,
@@ -179,6 +198,12 @@ impl Replica {
         };
         failed.failure.message = self.refusal_message(response, api_error, &failed.failure.message);
         failed.failure.status = Some(status);
+        if may_be_content {
+            let scrub = &self.connection.scrub;
+            let code = api_error.code.as_deref().map(|code| scrub.line(code));
+            let words = scrub.line(&api_error.message);
+            failed.refusal = Some(Box::new(Refusal::new(status, code.as_deref(), words)));
+        }
         let now = SystemTime::now();
         let mut wait = retry_after(&response.headers, now).max(api_error.wait);
         if wait.is_none() && status == 429 {
@@ -269,11 +294,16 @@ impl Replica {
 fn truncated_reply(unreadable: &Unreadable, limit: Option<u32>) -> Option<Reply> {
     let tokens = unreadable.usage?.completion_tokens?;
     let is_truncated = unreadable.finish.is_none() && tokens >= u64::from(limit?);
-    is_truncated.then(|| Reply {
+    is_truncated.then(|| empty_truncated(unreadable.usage))
+}
+
+/// A reply without text that ended at the token limit.
+fn empty_truncated(usage: Option<Usage>) -> Reply {
+    Reply {
         finish: Finish::Length,
-        usage: unreadable.usage,
+        usage,
         ..Reply::local(String::new())
-    })
+    }
 }
 
 /// True for a server error by which the request was rejected before any work on it.

@@ -2,6 +2,7 @@
 
 use super::api_error::ApiError;
 use super::ask_error::{AskError, Reach, Retry};
+use super::moderation::is_moderated;
 use super::wording::Wording;
 use crate::ask::requests::{AdaptableField, FieldState, RequestField, SentFields, is_unsupported};
 use crate::ask::wire::requested_wire;
@@ -26,16 +27,6 @@ const NO_CREDIT_PHRASES: [&str; 6] = [
     "insufficient credit",
     "insufficient balance",
     "out of credits",
-];
-
-/// Error codes and kinds for content rejected by moderation. Another question may be accepted.
-const MODERATED: [&str; 6] = [
-    "DataInspectionFailed",
-    "content_filter",
-    "ResponsibleAIPolicyViolation",
-    "content_policy_violation",
-    "moderation_blocked",
-    "data_inspection_failed",
 ];
 
 /// Phrases for a request larger than the limit of a whole minute (status 413 or 429): waiting does not help.
@@ -92,26 +83,24 @@ impl AskError {
             300..400 => {
                 Self::permanent("redirects are not followed: give the final address as --base-url")
             }
-            401 if !sent.has_key => Self::permanent(
+            401 if !sent.has_key => Self::by_status(
                 "no key was sent: set OPENAI_API_KEY, or name another variable or a file with --api-key-env or --api-key-file",
             ),
-            401 => Self::permanent(
+            401 => Self::by_status(
                 "check the key; it is taken from OPENAI_API_KEY (for Azure AZURE_OPENAI_API_KEY) unless --api-key-env or --api-key-file names another",
             ),
             407 => Self::permanent(
                 "the proxy asks for a user and password: set them in HTTP_PROXY, or name the host in NO_PROXY",
             ),
-            400..500
-                if api_error.has_code(&MODERATED) || (status == 403 && is_moderated(api_error)) =>
-            {
+            400..429 | 430..500 if is_moderated(status, api_error) => {
                 Self::new(FailureKind::Filtered, String::new())
             }
-            402 => Self::permanent(ADD_CREDIT),
-            403 => Self::permanent(
+            402 => Self::by_status(ADD_CREDIT),
+            403 => Self::by_status(
                 "the key may not use this model from here: check the key and --model",
             ),
-            404 | 410 => Self::permanent("check --base-url (many end with /v1) and --model"),
-            405 => Self::permanent(&format!(
+            404 | 410 => Self::by_status("check --base-url (many end with /v1) and --model"),
+            405 => Self::by_status(&format!(
                 "check --base-url: requests go to its path with /{} behind it",
                 wire.path()
             )),
@@ -137,6 +126,14 @@ impl AskError {
         Self {
             reach: Reach::Endpoint,
             ..Self::new(FailureKind::Request, hint.to_owned())
+        }
+    }
+
+    /// Error that every other request would have too, by the meaning of its status.
+    fn by_status(hint: &str) -> Self {
+        Self {
+            reach: Reach::ByStatus,
+            ..Self::permanent(hint)
         }
     }
 
@@ -195,10 +192,6 @@ impl AskError {
             ..Self::permanent(field.hint)
         }
     }
-}
-
-fn is_moderated(api_error: &ApiError) -> bool {
-    api_error.is_moderated || api_error.mentions_any(&["moderation", "flagged"])
 }
 
 #[cfg(test)]

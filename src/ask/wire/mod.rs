@@ -25,6 +25,7 @@ use super::wire_kind::Wire;
 use crate::error::{Error, Result};
 use crate::types::{Reply, Usage};
 
+pub(crate) use finish_reason::is_context_full;
 pub(super) use refusal::requested_wire;
 
 impl Wire {
