@@ -2,13 +2,15 @@
 
 use serde_json::Value;
 
-use super::failures::{ApiError, ReplyError};
+use super::failures::{
+    ApiError, Refusal, ReplyError, implied_status, is_moderated, is_out_of_tokens,
+};
 use super::replies::bounded_json::parse;
 use super::requests::Constrain;
 use super::requests::constraint::constrained_letter;
 use super::secrets::{Scrub, without_secrets};
 use super::wire::{batch_reply, body_usage};
-use crate::types::{Failure, FailureKind, Reply, Usage};
+use crate::types::{Failure, FailureKind, Finish, LostAttempts, Reply, Usage};
 
 /// Writes a line of an input file, with a line end: `{"custom_id", "method", "url", "body"}`, with the body of a single request.
 pub(super) fn input_line(id: &str, url: &str, body: &[u8]) -> Result<Vec<u8>, serde_json::Error> {
@@ -54,6 +56,7 @@ impl BatchLine {
     fn from_json(line: &Value, scrub: &Scrub) -> Option<Self> {
         let id = line.get("custom_id")?.as_str()?.to_owned();
         let result = result(line, scrub).map(|reply| without_secrets(reply, scrub));
+        let is_failure = result.is_err();
         let charged = match line
             .get("response")
             .and_then(|response| response.get("body"))
@@ -65,7 +68,7 @@ impl BatchLine {
             id,
             charged,
             result,
-            refusal: refusal(line),
+            refusal: refusal(line).filter(|_| is_failure),
         })
     }
 }
@@ -102,6 +105,23 @@ fn result(line: &Value, scrub: &Scrub) -> Result<Reply, Failure> {
     let status =
         response.and_then(|response| u16::try_from(response.get("status_code")?.as_u64()?).ok());
     let error = line.get("error").filter(|error| !is_empty(error));
+    let refused = |status: u16, api_error: &ApiError, usage: Option<Usage>| {
+        let words = scrub.line(&api_error.message);
+        let code = api_error.code.as_deref().map(|code| scrub.line(code));
+        let mut lost = LostAttempts::default();
+        if is_out_of_tokens(status, api_error) {
+            return Some(Reply {
+                finish: Finish::Length,
+                usage,
+                ..Reply::local(String::new())
+            });
+        }
+        lost.add(usage);
+        let is_filtered = (400..500).contains(&status)
+            && !matches!(status, 401 | 407 | 429)
+            && is_moderated(status, api_error);
+        is_filtered.then(|| Refusal::new(status, code.as_deref(), words).into_reply(1, lost))
+    };
     let fail = |kind, text: &str| {
         let text = scrub.line(text);
         Err(Failure {
@@ -117,6 +137,9 @@ fn result(line: &Value, scrub: &Scrub) -> Result<Reply, Failure> {
         } else {
             FailureKind::Request
         };
+        if let Some(reply) = refused(status.unwrap_or(400), &api_error, None) {
+            return Ok(reply);
+        }
         let code = api_error.code.unwrap_or_default();
         return fail(kind, format!("{code} {}", api_error.message).trim());
     }
@@ -129,13 +152,19 @@ fn result(line: &Value, scrub: &Scrub) -> Result<Reply, Failure> {
     let text = body_text(body);
     match status {
         None | Some(200..300) => batch_reply(&text).or_else(|error| match error {
-            ReplyError::Api(api_error) => fail(FailureKind::Server, &api_error.message),
+            ReplyError::Api(api_error) => {
+                refused(implied_status(&api_error), &api_error, body_usage(&text))
+                    .map_or_else(|| fail(FailureKind::Server, &api_error.message), Ok)
+            }
             ReplyError::Unreadable(unreadable) => {
                 fail(FailureKind::Response, &unreadable.description)
             }
         }),
         Some(code) => {
             let api_error = ApiError::from_body(&text);
+            if let Some(reply) = refused(code, &api_error, body_usage(&text)) {
+                return Ok(reply);
+            }
             let kind = match code {
                 429 => FailureKind::RateLimit,
                 // Some servers write 0 if they could not forward the request.
@@ -240,6 +269,29 @@ mod tests {
         for wrong in ["", "{}", r#"{"custom_id":7,"error":null}"#, "[1]"] {
             assert_eq!(BatchLine::read(wrong), None, "{wrong}");
         }
+    }
+
+    #[test]
+    fn refused_content_is_a_reply() {
+        for line in [
+            r#"{"custom_id":"k","response":{"status_code":400,"body":{"error":{"code":"content_filter","message":"filtered"}}}}"#,
+            r#"{"custom_id":"k","response":{"status_code":403,"body":{"error":"Content violates usage guidelines."}}}"#,
+            r#"{"custom_id":"k","response":{"status_code":200,"body":{"choices":null,"base_resp":{"status_code":1026,"status_msg":"input new_sensitive"}}}}"#,
+            r#"{"custom_id":"k","error":{"code":"content_policy_violation","message":"no"}}"#,
+        ] {
+            let line = read_line(line);
+            let reply = line.result.unwrap();
+            assert_eq!((&*reply.text, &reply.finish), ("", &Finish::Filter));
+            assert!(reply.refusal.is_some() && line.refusal.is_none());
+        }
+        let cut = read_line(
+            r#"{"custom_id":"k","response":{"status_code":400,"body":{"error":{"message":"Could not finish the message because max_tokens or model output limit was reached."}}}}"#,
+        );
+        assert_eq!(cut.result.unwrap().finish, Finish::Length);
+        let doubtful = read_line(
+            r#"{"custom_id":"k","response":{"status_code":200,"body":{"choices":[{"message":{"content":""},"finish_reason":"zeitgeist"}]}}}"#,
+        );
+        assert!(doubtful.result.unwrap().may_heal);
     }
 
     #[test]

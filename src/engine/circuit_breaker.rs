@@ -18,6 +18,13 @@ const FAILURES_IN_A_ROW: usize = 20;
 /// trials about it are set aside after as many.
 const MAX_FAILURES_PER_SOURCE: usize = 2;
 
+/// Number of refusals in a row by a status of the key, the credit or the address, in words that name no cause, after which a model that has
+/// succeeded before is stopped. Chosen: a gateway sends one by mistake, and they cost nothing.
+const REFUSALS_IN_A_ROW: usize = 3;
+
+/// Minimum number of frames or walks of refusals in a row that may concern the content, for a model to be stopped; chosen.
+const MIN_REFUSED_SOURCES: usize = 3;
+
 /// Reason why no more trials are asked.
 #[derive(Debug)]
 pub(crate) enum EndReason {
@@ -59,8 +66,40 @@ struct ModelHealth {
     refusals: usize,
     /// Frames or walks of the refused requests. If there is only one, it may be the cause, and the model is not stopped.
     refused_sources: BTreeSet<String>,
+    /// Number of refusals since the last success by a status that concerns every request.
+    status_refusals: usize,
+    /// Frames or walks of these refusals.
+    status_sources: BTreeSet<String>,
     /// True if no more trials of the model are asked.
     stopped: bool,
+}
+
+impl ModelHealth {
+    /// Counts a refused request.
+    fn count_refusal(&mut self, error: &AskError, source: &str) {
+        self.refusals += 1;
+        self.refused_sources.insert(source.to_owned());
+        if error.reach == Reach::ByStatus {
+            self.status_refusals += 1;
+            self.status_sources.insert(source.to_owned());
+        }
+    }
+
+    /// True if every further request would be refused, as far as the refusals of this kind show: the model has answered nothing, or has
+    /// stopped answering.
+    fn is_refused(&self, error: &AskError) -> bool {
+        let is_by_status = error.reach == Reach::ByStatus
+            && if error.refusal.is_some() {
+                // The content of a frame or two may be the cause.
+                self.status_refusals >= FAILURES_AT_START
+                    && self.status_sources.len() >= MIN_REFUSED_SOURCES
+            } else {
+                self.status_refusals >= REFUSALS_IN_A_ROW
+            };
+        let is_first =
+            !self.succeeded && self.refusals >= FAILURES_AT_START && self.refused_sources.len() > 1;
+        is_by_status || is_first
+    }
 }
 
 /// One model with its endpoint and its health.
@@ -173,6 +212,8 @@ impl CircuitBreaker {
         let health = &mut self.models[model].health;
         (health.succeeded, health.outage) = (true, 0);
         health.outage_sources.clear();
+        health.status_refusals = 0;
+        health.status_sources.clear();
     }
 
     /// Records a failed trial about a frame or walk. `may_be_cause` is the result of
@@ -188,6 +229,21 @@ impl CircuitBreaker {
             return;
         }
         self.failures += 1;
+        if error.failure.kind == FailureKind::Request && error.refusal.is_none() {
+            self.models[model].health.count_refusal(error, source);
+        }
+        self.check(model, error, source, may_be_cause);
+    }
+
+    /// Records a refused trial about a frame or walk that waits until the model answers another one. If it fails in the end,
+    /// [`failed`](Self::failed) counts it.
+    pub(crate) fn refused(&mut self, model: usize, error: &AskError, source: &str) {
+        self.models[model].health.count_refusal(error, source);
+        self.check(model, error, source, false);
+    }
+
+    /// Stops a model or the run if the last failure shows that further trials would fail.
+    fn check(&mut self, model: usize, error: &AskError, source: &str, may_be_cause: bool) {
         let ModelState {
             name,
             endpoint,
@@ -201,11 +257,7 @@ impl CircuitBreaker {
             .unwrap_or(message);
         match kind {
             // The images or their content are the cause; the next may succeed.
-            FailureKind::Image | FailureKind::Filtered => {}
-            FailureKind::Request => {
-                health.refusals += 1;
-                health.refused_sources.insert(source.to_owned());
-            }
+            FailureKind::Image | FailureKind::Filtered | FailureKind::Request => {}
             _ => {
                 let source_failures = health.outage_sources.entry(source.to_owned()).or_default();
                 *source_failures += 1;
@@ -215,7 +267,6 @@ impl CircuitBreaker {
                 health.outage += usize::from(counts);
             }
         }
-        let refused = health.refusals >= FAILURES_AT_START && health.refused_sources.len() > 1;
         let max_outage = if health.succeeded {
             self.max_outage
         } else {
@@ -223,7 +274,12 @@ impl CircuitBreaker {
         };
         let problem = if error.reach == Reach::Endpoint {
             Some(format!("{name}: {message}"))
-        } else if refused && !health.succeeded {
+        } else if health.is_refused(error) && health.succeeded {
+            Some(format!(
+                "{name}: {} trials in a row were refused: {message}",
+                health.status_refusals
+            ))
+        } else if health.is_refused(error) {
             Some(format!(
                 "{name}: the first {} trials were all refused: {message}",
                 health.refusals

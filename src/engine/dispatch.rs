@@ -18,6 +18,7 @@ use crate::engine::first_failures::FirstFailures;
 use crate::engine::interrupt::Interrupt;
 use crate::engine::lanes::{Lanes, PreparedTrial};
 use crate::engine::models::ModelUnderTest;
+use crate::engine::refusals::Refusals;
 use crate::engine::sending::{Finished, send};
 use crate::engine::served_names::ServedNames;
 use crate::engine::settings::JobSettings;
@@ -31,7 +32,7 @@ use crate::images::timings::{TimedStep, Timings};
 use crate::images::trials::{Item, PreparedGroup, Trial};
 use crate::images::workers::thread_start_error;
 use crate::store::Store;
-use crate::types::{Digest, FailureKind, Finish, Record, SetLight, TrialKey};
+use crate::types::{Digest, FailureKind, Finish, Record, Reply, SetLight, TrialKey};
 use darkqa_score::answers::record::answered;
 use darkqa_score::answers::{ImageDependence, LitReply};
 
@@ -82,6 +83,7 @@ impl Dispatcher<'_> {
             bar: self.progress.trials(counts.trials, counts.answered),
             breaker: self.breaker(),
             suspects: Suspects::default(),
+            refusals: Refusals::new(self.models.len()),
             not_asked: BTreeMap::new(),
             budget,
             stoppers,
@@ -130,6 +132,8 @@ struct ReplySink<'a, I: Item> {
     breaker: CircuitBreaker,
     /// Images for which the server fails repeatedly.
     suspects: Suspects,
+    /// Refused trials that wait for another answer.
+    refusals: Refusals<I>,
     /// Number of trials by frame or walk that were not asked because the server fails for it.
     not_asked: BTreeMap<String, usize>,
     budget: Budget,
@@ -206,12 +210,15 @@ impl<I: Item> ReplySink<'_, I> {
             if in_flight.is_empty() && !lanes.is_empty() {
                 self.breaker.over_budget();
             }
-            if !more_groups && lanes.is_empty() && in_flight.is_empty() && lanes.has_deferred() {
+            let all_asked = !more_groups && lanes.is_empty() && in_flight.is_empty();
+            if all_asked && lanes.has_deferred() {
                 lanes.requeue_deferred();
                 self.suspects.start_deferred();
                 continue;
             }
-            let all_asked = !more_groups && lanes.is_empty() && in_flight.is_empty();
+            if all_asked && !self.breaker.stopped() && lanes.requeue(self.refusals.release_last()) {
+                continue;
+            }
             if all_asked || self.breaker.stopped() {
                 break;
             }
@@ -234,6 +241,7 @@ impl<I: Item> ReplySink<'_, I> {
                         lanes.ended(ready.trial.model);
                     }
                     self.store_result(done)?;
+                    lanes.requeue(self.refusals.take_released());
                 }
                 group = groups.recv(), if wants_more => match group {
                     Some(group) => {
@@ -251,6 +259,9 @@ impl<I: Item> ReplySink<'_, I> {
         if self.breaker.stopped() {
             self.stoppers.iter().for_each(EnhancerStopper::stop);
             self.drain(in_flight, interrupt, grace).await?;
+        }
+        for (ready, refused) in self.refusals.take_rest(!self.breaker.stopped()) {
+            self.store_settled(ready, refused)?;
         }
         for (source, trials) in &self.not_asked {
             tracing::warn!(
@@ -448,17 +459,39 @@ impl<I: Item> ReplySink<'_, I> {
             Err(aborted) if aborted.is_cancelled() => return Ok(()),
             Err(panic) => std::panic::resume_unwind(panic.into_panic()),
         };
-        let trial = &ready.trial;
+        let model = ready.trial.model;
         // Zero attempts: the image could not be made, and nothing was sent.
         let attempts = match &result {
             Ok(reply) => reply.attempts,
             Err(error) => error.attempts,
         };
         if attempts > 0 {
-            self.first_questions[trial.model] = FirstQuestion::Ended;
+            self.first_questions[model] = FirstQuestion::Ended;
         }
-        self.limits.warn_exceeded(trial.model, &self.budget);
-        self.limits.warn_of_charges(trial.model, &self.budget);
+        self.limits.warn_exceeded(model, &self.budget);
+        self.limits.warn_of_charges(model, &self.budget);
+        match result {
+            Err(refused) if self.refusals.must_wait(&ready, &refused) => {
+                self.breaker
+                    .refused(model, &refused, ready.trial.item.source());
+                self.refusals.add(ready, refused);
+            }
+            result => {
+                for (ready, result) in self.refusals.settle((ready, result)) {
+                    self.store_settled(ready, result)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Stores the reply or the failure of one trial, once a refusal is known to concern the trial or the run.
+    fn store_settled(
+        &mut self,
+        ready: PreparedTrial<I>,
+        result: Result<Reply, AskError>,
+    ) -> Result<()> {
+        let trial = &ready.trial;
         match &result {
             Ok(_) => {
                 self.breaker.succeeded(trial.model);
@@ -477,11 +510,16 @@ impl<I: Item> ReplySink<'_, I> {
                 let may_be_cause = self.suspects.may_be_cause(trial.model, source);
                 self.breaker
                     .failed(trial.model, error, source, may_be_cause);
-                if error.reach == Reach::Trial {
+                let concerns_all = match error.reach {
+                    Reach::Trial => false,
+                    Reach::ByStatus => self.breaker.is_stopped(trial.model),
+                    _ => true,
+                };
+                if !concerns_all {
                     self.first_failures.add(trial.model, source, &error.failure);
                 }
                 // If the endpoint is the cause or the run ends, the trial does not count as asked, unless it cost something.
-                if error.reach != Reach::Trial && error.lost.is_none() {
+                if concerns_all && error.lost.is_none() {
                     return Ok(());
                 }
             }

@@ -133,6 +133,16 @@ impl<'a, I> Lanes<'a, I> {
         }
     }
 
+    /// Appends trials that are asked again to the waiting ones; true if there are any.
+    pub(crate) fn requeue(&mut self, again: Vec<PreparedTrial<I>>) -> bool {
+        let has_any = !again.is_empty();
+        for ready in again {
+            let lane = self.lane_of_model[ready.trial.model];
+            self.by_endpoint[lane].waiting.push_back(ready);
+        }
+        has_any
+    }
+
     /// Takes the next trial from a lane that has room and is not held by the budget. Trials for which `is_dropped` is true are dropped;
     /// those for which `is_deferred` is true are set aside until [`Self::requeue_deferred`].
     pub(crate) fn next(

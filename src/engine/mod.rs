@@ -23,6 +23,7 @@ pub(crate) mod models;
 pub(crate) mod observer;
 pub(crate) mod open_files;
 pub(crate) mod open_run;
+mod refusals;
 pub(crate) mod room_net;
 mod sending;
 mod served_names;

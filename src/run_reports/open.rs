@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use super::alerts::{joining_alerts, run_alerts};
+use super::alerts::{joining_alerts, open_early_ends, run_alerts};
 use super::combine::command_path;
 use super::enhancers;
 use super::join::join;
@@ -250,6 +250,7 @@ pub(super) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<JoinedRuns> {
     let joined = join(runs, is_answer)?;
     let mut alerts = run_alerts(&joined);
     alerts.extend(joining_alerts(&joined));
+    alerts.extend(open_early_ends(&joined));
     if joined.runs.len() == 1 {
         // The text and the page of a single run describe what is missing in more detail.
         alerts.retain(|alert| alert.kind != AlertKind::NotComplete);

@@ -12,10 +12,11 @@ pub(crate) use crate::runs::run_texts::RunTexts;
 use crate::store;
 use crate::types::manifests::{Counts, RunManifest, Status};
 use crate::types::{
-    ChoiceDetail, ImageFidelity, ListedModel, ModelListing, OpenDetail, QuestionId, Record,
-    RunQuestion, StoredDetail as _, TextPlace, Thumbnail, TrialRef, Trials,
+    ChoiceDetail, FailureKind, Finish, ImageFidelity, ListedModel, ModelListing, OpenDetail,
+    QuestionId, Record, Reply, RunQuestion, StoredDetail as _, TextPlace, Thumbnail, TrialRef,
+    Trials,
 };
-use darkqa_score::answers::record::Detail;
+use darkqa_score::answers::record::{Detail, answered};
 
 /// The models of a run that a report shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -59,10 +60,11 @@ impl<D: Detail> StoredRun<D> {
     pub(crate) fn open(folder: &Path) -> Result<Self> {
         let manifest = store::read_manifest(folder, D::SCHEMA)?;
         let manifest = manifest.ok_or_else(|| no_run(folder))?;
-        let mut trials = Trials::default();
+        let mut trials = Ok(Trials::default());
         store::each_record(folder, |record, place| {
-            trials.add(record, TextPlace::new(place.start));
+            add_trial(&mut trials, record, TextPlace::new(place.start));
         })?;
+        let trials = trials?;
         let mut run = Self::from_trials(folder, manifest, trials)?;
         if run.manifest.status == Status::Started {
             let failed = run.trials.iter().map(TrialRef::failed);
@@ -76,11 +78,11 @@ impl<D: Detail> StoredRun<D> {
     /// # Errors
     /// If a line of a file is broken.
     pub(crate) fn reread(folder: &Path, manifest: RunManifest) -> Result<Self> {
-        let mut trials = Trials::default();
+        let mut trials = Ok(Trials::default());
         store::each_reread_record(folder, |record, place| {
-            trials.add(record, TextPlace::new(place.start));
+            add_trial(&mut trials, record, TextPlace::new(place.start));
         })?;
-        Self::from_trials(folder, manifest, trials)
+        Self::from_trials(folder, manifest, trials?)
     }
 
     /// The run in a folder, given its manifest and trials. The records themselves stay on disk.
@@ -146,7 +148,7 @@ impl<D: Detail> StoredRun<D> {
         Ok(Record {
             model: trial.model().to_owned(),
             condition: trial.condition().cloned(),
-            ..self.texts.record(trial.text())?
+            ..refused_as_filtered(self.texts.record(trial.text())?)?
         })
     }
 
@@ -165,6 +167,48 @@ impl<D: Detail> StoredRun<D> {
     /// Name of the run, which is the name of its folder.
     pub(crate) fn name(&self) -> String {
         run_name(&self.folder)
+    }
+}
+
+/// Adds the trial of a record; the first error replaces all trials.
+fn add_trial<D: Detail>(trials: &mut Result<Trials<D>>, record: Record<D>, text: TextPlace) {
+    match refused_as_filtered(record) {
+        Ok(record) => {
+            if let Ok(trials) = trials {
+                trials.add(record, text);
+            }
+        }
+        Err(e) if trials.is_ok() => *trials = Err(e),
+        Err(_) => {}
+    }
+}
+
+/// A record whose content the server refused, as earlier versions stored it, as a failure: it counts as the reply that this version stores,
+/// withheld by a filter. Other records are unchanged.
+///
+/// # Errors
+/// If the choices of the record are not valid.
+fn refused_as_filtered<D: Detail>(record: Record<D>) -> Result<Record<D>> {
+    match record.failure {
+        Some(failure) if failure.kind == FailureKind::Filtered => {
+            let reply = Reply {
+                refusal: Some(failure.message),
+                finish: Finish::Filter,
+                attempts: record.attempts,
+                lost: record.lost,
+                ..Reply::local(String::new())
+            };
+            let blank = Record {
+                failure: None,
+                ..record
+            };
+            let record = answered(blank, reply)?;
+            Ok(Record {
+                latency_ms: None,
+                ..record
+            })
+        }
+        failure => Ok(Record { failure, ..record }),
     }
 }
 

@@ -39,6 +39,8 @@ pub enum Line {
     Right,
     /// A response with this status and message.
     Status(u16, &'static str),
+    /// A reply without text, with this finish reason.
+    Ended(&'static str),
     /// A line of the error file: the batch ended before it.
     Expired,
     /// No line at all.
@@ -568,6 +570,11 @@ impl StoredBatch {
         for (i, request) in self.requests.iter().enumerate() {
             match (self.course.line)(i) {
                 Line::Right => output.push(reply(request, 200, &self.completion(self.course.text))),
+                Line::Ended(word) => {
+                    let mut completion = self.completion("");
+                    completion["choices"][0]["finish_reason"] = word.into();
+                    output.push(reply(request, 200, &completion));
+                }
                 Line::Status(status, message) => {
                     let body = json!({"error": {"message": message, "type": "x", "param": null, "code": null}});
                     errors.push(reply(request, status, &body));

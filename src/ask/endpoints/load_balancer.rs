@@ -1,6 +1,6 @@
 //! Choice of the replica for a request, by load and health: [`LoadBalancer`].
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tokio::time::{Duration, Instant};
@@ -15,6 +15,9 @@ const AFFINITY_SLACK: usize = 3;
 
 /// Number of consecutive connection or server failures after which a replica is not used for a time; chosen.
 const MAX_FAILURES: u32 = 3;
+
+/// Number of consecutive refusals by a status that concerns all requests after which a replica gets no more requests; chosen.
+const MAX_REFUSALS: usize = 3;
 
 /// First time for which a replica is not used. Each further time is longer by this much, up to [`MAX_BACKOFF`]. Chosen.
 const FIRST_BACKOFF: Duration = Duration::from_secs(5);
@@ -66,6 +69,8 @@ struct ModelState {
     served_model: Option<String>,
     /// Replicas that get no more requests to this model in this run.
     excluded: BTreeSet<usize>,
+    /// Number of refusals in a row, by replica, with a status that concerns all requests.
+    refusals: BTreeMap<usize, usize>,
 }
 
 /// State of one replica.
@@ -150,6 +155,7 @@ impl LoadBalancer {
             id,
             served_model: None,
             excluded: BTreeSet::new(),
+            refusals: BTreeMap::new(),
         });
         ModelIndex(state.models.len() - 1)
     }
@@ -240,6 +246,7 @@ impl LoadBalancer {
         let State { replicas, models } = &mut *state;
         let (replica, model) = (&mut replicas[index], &mut models[model.0]);
         replica.record_success(sent);
+        model.refusals.remove(&index);
         let Some(name) = served_model else {
             return true;
         };
@@ -267,9 +274,16 @@ impl LoadBalancer {
         let status = failed.failure.status;
         let is_refused = matches!(status, Some(401 | 403 | 404 | 405 | 410));
         // If only a field was refused, the replica is asked again without it.
-        if failed.reach == Reach::Endpoint && is_refused && failed.refused_field.is_none() {
+        let concerns_all = matches!(failed.reach, Reach::Endpoint | Reach::ByStatus);
+        if concerns_all && is_refused && failed.refused_field.is_none() {
             let State { replicas, models } = &mut *state;
             let model = &mut models[model.0];
+            let refusals = model.refusals.entry(index).or_default();
+            *refusals += 1;
+            if failed.reach == Reach::ByStatus && *refusals < MAX_REFUSALS {
+                // The request may be the cause: another replica shows it.
+                return Failover::to_other_replica_if(model.excluded.len() + 1 < replicas.len());
+            }
             if model.excluded.insert(index) {
                 warn!(
                     "{}: it gets no more requests for {}: {}",

@@ -11,7 +11,10 @@ use super::connection::{Connection, Deadline, HttpResponse};
 use super::sending::Sending;
 use super::served_model::served_model;
 use super::url::BaseUrl;
-use crate::ask::failures::{ApiError, AskError, Reach, ReplyError, Retry, Unfinished, Unreadable};
+use crate::ask::failures::{
+    ApiError, AskError, Reach, Refusal, ReplyError, Retry, Unfinished, Unreadable, implied_status,
+    is_out_of_tokens,
+};
 use crate::ask::pace::{Gate, RateLimits, Window, retry_after};
 use crate::ask::requests::Request;
 use crate::ask::secrets::without_secrets;
@@ -19,7 +22,7 @@ use crate::ask::vendors::Vendor;
 use crate::ask::wire::{body_usage, cost_in_headers, with_cost};
 use crate::ask::wire_kind::Wire;
 use crate::error::Result;
-use crate::types::{FailureKind, Finish, Reply};
+use crate::types::{FailureKind, Finish, Reply, Usage};
 
 /// One address of an endpoint, with its key, pooled connections, rate limiter and concurrency window.
 #[derive(Debug)]
@@ -110,7 +113,7 @@ impl Replica {
             if response.status.is_redirection() {
                 api_error.message = format!("moved to {}", response.header(LOCATION.as_str()));
             }
-            return Err(self.refusal(status, &api_error, &response, request, sent));
+            return self.reply_or_refusal(status, &api_error, &response, request, sent);
         }
         let reply_error = match wire.reply(&response.body, response.header(CONTENT_TYPE.as_str())) {
             Ok(reply) => return Ok(self.finish_reply(reply, &response, request, sent)),
@@ -118,12 +121,13 @@ impl Replica {
         };
         let cost = cost_in_headers(&response.headers);
         let mut failed = match reply_error {
-            // An error without a code is a temporary failure of the server.
             ReplyError::Api(api_error) => {
-                let code = api_error
-                    .status()
-                    .unwrap_or_else(|| api_error.likely_status());
-                self.refusal(code, &api_error, &response, request, sent)
+                let implied = implied_status(&api_error);
+                let refused = self.reply_or_refusal(implied, &api_error, &response, request, sent);
+                match refused {
+                    Ok(reply) => return Ok(reply),
+                    Err(failed) => failed,
+                }
             }
             ReplyError::Unreadable(unreadable) => {
                 let limit = request.sent.parameters.limit();
@@ -134,17 +138,12 @@ impl Replica {
                     description,
                     usage,
                     finish,
-                    is_final,
                     broke_off,
                 } = *unreadable;
                 let scrub = self.connection.scrub();
                 let message = format!("{} answered with {}", self.base(), scrub.line(&description));
                 AskError {
-                    retry: if is_final {
-                        Retry::Never
-                    } else {
-                        Retry::AfterDelay
-                    },
+                    retry: Retry::AfterDelay,
                     finish: finish.map(|word| scrub.line(&word)),
                     unfinished: if broke_off {
                         Unfinished::BrokeOff
@@ -183,6 +182,23 @@ impl Replica {
         without_secrets(reply, &self.connection.scrub())
     }
 
+    /// Error of a request that the server refused with this status; or an empty truncated reply, if the server says that it generated up to
+    /// the token limit.
+    fn reply_or_refusal(
+        &self,
+        status: u16,
+        api_error: &ApiError,
+        response: &HttpResponse,
+        request: &Request<'_>,
+        sent: Instant,
+    ) -> Result<Reply, AskError> {
+        if is_out_of_tokens(status, api_error) {
+            let usage = body_usage(&String::from_utf8_lossy(&response.body));
+            return Ok(self.finish_reply(empty_truncated(usage), response, request, sent));
+        }
+        Err(self.refusal(status, api_error, response, request, sent))
+    }
+
     /// Error of a request that the server refused with this status; pauses the gate if the server asks for it.
     fn refusal(
         &self,
@@ -202,6 +218,7 @@ impl Replica {
             FailureKind::RateLimit => 429,
             _ => status,
         };
+        let may_be_content = failed.may_be_content(status);
         let is_retryable = match response.header("x-should-retry") {
             "true" => true,
             "false" => false,
@@ -209,6 +226,12 @@ impl Replica {
         };
         failed.failure.message = self.refusal_message(response, api_error, &failed.failure.message);
         failed.failure.status = Some(status);
+        if may_be_content {
+            let scrub = self.connection.scrub();
+            let code = api_error.code.as_deref().map(|code| scrub.line(code));
+            let words = scrub.line(&api_error.message);
+            failed.refusal = Some(Box::new(Refusal::new(status, code.as_deref(), words)));
+        }
         let mut wait = api_error.wait;
         if wait.is_none() && pace_status == 429 {
             wait = RateLimits::read(&response.headers, now).pause();
@@ -311,11 +334,16 @@ impl Replica {
 fn truncated_reply(unreadable: &Unreadable, limit: Option<u32>) -> Option<Reply> {
     let tokens = unreadable.usage?.completion_tokens?;
     let is_truncated = unreadable.finish.is_none() && tokens >= u64::from(limit?);
-    is_truncated.then(|| Reply {
+    is_truncated.then(|| empty_truncated(unreadable.usage))
+}
+
+/// A reply without text that ended at the token limit.
+fn empty_truncated(usage: Option<Usage>) -> Reply {
+    Reply {
         finish: Finish::Length,
-        usage: unreadable.usage,
+        usage,
         ..Reply::local(String::new())
-    })
+    }
 }
 
 /// True for a server error by which the request was rejected before any work on it.

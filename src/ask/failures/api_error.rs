@@ -6,6 +6,7 @@ use std::time::Duration;
 use regex::Regex;
 use serde_json::Value;
 
+use super::structured_error::find_error;
 use super::vocabulary;
 use crate::ask::pace::{wait_in_field, wait_in_words};
 use crate::ask::replies::bounded_json::{parse, parse_start};
@@ -86,12 +87,14 @@ impl ApiError {
         if let Value::Array(items) = body {
             return items.first().and_then(Self::from_json);
         }
-        let found = Self::in_error(body).or_else(|| {
-            ["message", "detail", "title"]
-                .iter()
-                .any(|field| body.get(field).is_some_and(is_filled))
-                .then(|| Self::from_error(body))
-        });
+        let found = Self::in_error(body)
+            .or_else(|| {
+                ["message", "detail", "title"]
+                    .iter()
+                    .any(|field| body.get(field).is_some_and(is_filled))
+                    .then(|| Self::from_error(body))
+            })
+            .or_else(|| Self::in_structure(body));
         found.map(|found| Self {
             // Hugging Face puts the wait next to the error.
             wait: found.wait.max(stated_wait(body)),
@@ -104,6 +107,11 @@ impl ApiError {
         body.get("error")
             .filter(|error| is_filled(error))
             .map(Self::from_error)
+    }
+
+    /// Parses an error by its structure: an object with an error code and words, under any name.
+    pub(in crate::ask) fn in_structure(body: &Value) -> Option<Self> {
+        find_error(body).as_ref().map(Self::from_error)
     }
 
     /// Parses the value of a field `error`.
@@ -309,8 +317,6 @@ pub(in crate::ask) struct Unreadable {
     pub(in crate::ask) usage: Option<Usage>,
     /// Finish reason of the server, if it is unknown or means that the reply is incomplete.
     pub(in crate::ask) finish: Option<String>,
-    /// True if the same request would fail in the same way.
-    pub(in crate::ask) is_final: bool,
     /// True if the body has a part of the reply, so that the server has worked on it.
     pub(in crate::ask) broke_off: bool,
 }

@@ -6,7 +6,7 @@ use super::quota_refusal::QuotaRefusal;
 use super::unfinished::Unfinished;
 use crate::ask::costs::Charge;
 use crate::ask::requests::AdaptableField;
-use crate::types::{Failure, FailureKind, LostAttempts, Usage};
+use crate::types::{Failure, FailureKind, Finish, LostAttempts, Reply, Usage};
 
 /// Requests that a failure affects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -15,6 +15,9 @@ pub enum Reach {
     Trial,
     /// Every request of this size. Before the first reply of the model: every further request to it.
     Alike,
+    /// Every further request to this model by the meaning of the status alone (403, 404 …): the server's words name no such cause, so that
+    /// it may be this request. The run stops once several were refused in a row.
+    ByStatus,
     /// Every further request to this model: the cause is the key, the credit, the address, the name or the parameters.
     Endpoint,
     /// No other request: the run ended before the reply, and the request may not have been sent.
@@ -30,6 +33,58 @@ pub(crate) enum Retry {
     AfterDelay,
     /// Retry as soon as the endpoint accepts requests again. This does not use a retry; only `--retries patience` ends it.
     WhenAccepted,
+}
+
+/// A refusal that may concern the content of one request alone.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Refusal {
+    /// HTTP status; of an error sent with a success status, the status that its words imply.
+    pub status: u16,
+    /// The server's code or else the beginning of its words, without numbers: equal in refusals for the same cause.
+    pub cause: String,
+    /// The server's words, without secrets.
+    pub words: String,
+}
+
+impl Refusal {
+    /// Number of words that identify a cause; chosen: ids and sizes follow later.
+    const CAUSE_WORDS: usize = 6;
+
+    /// The refusal with this status, code and words.
+    pub(in crate::ask) fn new(status: u16, code: Option<&str>, words: String) -> Self {
+        // Some servers repeat the status as the code.
+        let code = code.filter(|code| *code != status.to_string());
+        let cause = code.map_or_else(
+            || {
+                words
+                    .split_whitespace()
+                    .filter(|word| !word.contains(|c: char| c.is_ascii_digit()))
+                    .take(Self::CAUSE_WORDS)
+                    .collect::<Vec<&str>>()
+                    .join(" ")
+                    .to_lowercase()
+            },
+            str::to_owned,
+        );
+        Self {
+            status,
+            cause,
+            words,
+        }
+    }
+
+    /// The reply that the model did not give, after this number of requests: without text, ended by a filter, with the server's words as
+    /// the refusal. It is scored as the same filter is if the server sends it as a finish reason.
+    #[must_use]
+    pub fn into_reply(self, attempts: u32, lost: LostAttempts) -> Reply {
+        Reply {
+            refusal: Some(format!("{}: {}", self.status, self.words)),
+            finish: Finish::Filter,
+            attempts,
+            lost,
+            ..Reply::local(String::new())
+        }
+    }
 }
 
 /// Error of a request, or of a question after all its requests.
@@ -52,6 +107,8 @@ pub struct AskError {
     pub lost: Box<LostAttempts>,
     /// Finish reason of the server, if it is the reason for the missing reply.
     pub finish: Option<String>,
+    /// The refusal, if it may concern the content of this request alone.
+    pub refusal: Option<Box<Refusal>>,
     pub(crate) retry: Retry,
     /// Wait that the server asked for.
     pub(crate) wait: Option<Duration>,
@@ -80,6 +137,7 @@ impl AskError {
             forced: &[],
             lost: Box::default(),
             finish: None,
+            refusal: None,
             retry: Retry::Never,
             wait: None,
             unfinished: Unfinished::None,
@@ -127,6 +185,32 @@ impl AskError {
             attempts,
             lost: Box::new(lost),
             ..self
+        }
+    }
+
+    /// True if a refusal with this status may concern the content of the request alone: moderation rejected it, or neither the server's
+    /// words nor the size of the request explain it. The message must still be the remedy alone.
+    pub(in crate::ask) fn may_be_content(&self, status: u16) -> bool {
+        let is_unexplained = match self.reach {
+            Reach::Trial => self.failure.message.is_empty(),
+            // 401, 402, 405 and 407 speak of the key, the credit, the address or the proxy.
+            Reach::ByStatus => matches!(status, 403 | 404 | 410),
+            _ => false,
+        };
+        let is_refused = self.failure.kind == FailureKind::Request
+            && (400..500).contains(&status)
+            && self.refused_field.is_none();
+        self.failure.kind == FailureKind::Filtered || (is_refused && is_unexplained)
+    }
+
+    /// The reply that a filter withheld, of a refusal that concerns the content of the request.
+    ///
+    /// # Errors
+    /// The error itself, if it is no such refusal.
+    pub(crate) fn into_filtered(mut self) -> Result<Reply, Self> {
+        match self.refusal.take() {
+            Some(refusal) => Ok(refusal.into_reply(self.attempts, *self.lost)),
+            None => Err(self),
         }
     }
 

@@ -9,6 +9,7 @@ use regex::Regex;
 
 use super::api_error::ApiError;
 use super::ask_error::{AskError, Reach, Retry};
+use super::moderation::is_moderated;
 use super::vocabulary;
 use super::wording::Wording;
 use crate::ask::requests::{
@@ -18,16 +19,6 @@ use crate::ask::requests::{
 use crate::ask::wire::requested_wire;
 use crate::ask::wire_kind::Wire;
 use crate::types::FailureKind;
-
-/// Error codes and kinds for content rejected by moderation. Another question may be accepted.
-const MODERATED: [&str; 6] = [
-    "DataInspectionFailed",
-    "content_filter",
-    "ResponsibleAIPolicyViolation",
-    "content_policy_violation",
-    "moderation_blocked",
-    "data_inspection_failed",
-];
 
 /// Phrases for a request larger than the limit of a whole minute (status 413 or 429): waiting does not help.
 const TOO_LARGE: [&str; 2] = ["request too large", "request is too large"];
@@ -176,9 +167,7 @@ impl AskError {
         sent: SentFields<'_>,
     ) -> Option<Self> {
         let mentions = |words: &[&str]| api_error.mentions_any(words);
-        let is_moderated =
-            api_error.has_code(&MODERATED) || (status == 403 && is_moderated(api_error));
-        if is_moderated {
+        if is_moderated(status, api_error) {
             return Some(Self::new(FailureKind::Filtered, String::new()));
         }
         let field = Self::from_field(api_error, &wire.fields(sent));
@@ -227,17 +216,17 @@ impl AskError {
             300..400 => {
                 Self::permanent("redirects are not followed: give the final address as --base-url")
             }
-            401 if !sent.has_key => Self::permanent(
+            401 if !sent.has_key => Self::of_status(
                 "no key was sent: set OPENAI_API_KEY, or name another variable or a file with --api-key-env or --api-key-file",
             ),
-            401 => Self::permanent(CHECK_KEY),
+            401 => Self::of_status(CHECK_KEY),
             407 => Self::permanent(
                 "the proxy asks for a user and password: set them in HTTP_PROXY, or name the host in NO_PROXY",
             ),
-            400..500 if api_error.has_code(&MODERATED) => {
+            400..429 | 430..500 if is_moderated(status, api_error) => {
                 Self::new(FailureKind::Filtered, String::new())
             }
-            402 => Self::permanent(PAY),
+            402 => Self::of_status(PAY),
             403 if (says_nothing || !api_error.mentions_any(&vocabulary::CONTENT))
                 && (mentions(&vocabulary::WRONG_KEY)
                     || mentions(&vocabulary::NO_RIGHT)
@@ -254,8 +243,8 @@ impl AskError {
                 Self::permanent("check --base-url (many end with /v1) and --model")
             }
             // The words say something else, which may concern this request alone.
-            403 | 404 | 410 => Self::alike(""),
-            405 => Self::permanent(&format!(
+            403 | 404 | 410 => Self::of_status(""),
+            405 => Self::of_status(&format!(
                 "check --base-url: requests go to its path with /{} behind it",
                 wire.path()
             )),
@@ -311,6 +300,14 @@ impl AskError {
         Self {
             reach: Reach::Endpoint,
             ..Self::new(FailureKind::Request, hint.to_owned())
+        }
+    }
+
+    /// Error that every other request would have too, by the meaning of its status.
+    fn of_status(hint: &str) -> Self {
+        Self {
+            reach: Reach::ByStatus,
+            ..Self::permanent(hint)
         }
     }
 
@@ -382,10 +379,6 @@ impl AskError {
             ..Self::permanent(field.hint)
         }
     }
-}
-
-fn is_moderated(api_error: &ApiError) -> bool {
-    api_error.is_moderated || api_error.mentions_any(&["moderation", "flagged"])
 }
 
 #[cfg(test)]

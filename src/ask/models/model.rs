@@ -244,6 +244,13 @@ impl Model {
             .is_some_and(|model| model.adapt_to_refusal(status, body))
     }
 
+    /// True if a line of a batch may have been refused for its content alone.
+    #[must_use]
+    pub(crate) fn may_refuse_content(&self, status: u16, body: &[u8]) -> bool {
+        self.remote()
+            .is_some_and(|model| model.may_refuse_content(status, body))
+    }
+
     fn remote(&self) -> Option<&Remote> {
         match self {
             Self::Remote(model) => Some(model),

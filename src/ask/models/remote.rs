@@ -8,6 +8,7 @@ use reqwest::header::HeaderMap;
 use serde_json::{Map, Value};
 use tracing::warn;
 
+use super::finish_words::FinishWords;
 use super::stream_fallback::{AskedBefore, StreamFallback};
 use crate::ask::costs::Reservation;
 use crate::ask::endpoints::{Endpoint, ModelIndex};
@@ -40,15 +41,22 @@ pub struct Remote {
     /// Outcome of the first question. The other questions wait for it, so that a refusal that concerns all requests costs a single one.
     first_question: tokio::sync::Mutex<FirstQuestion>,
     streams: StreamFallback,
+    /// True after the first reply.
+    has_answered: AtomicBool,
+    finish_words: FinishWords,
     /// True after the warning about a reply that does not follow the constraint.
     warned_unconstrained: AtomicBool,
 }
 
+/// Number of refusals by a status that concerns all questions after which the model is not asked any further, if it has answered none.
+/// Chosen: they cost nothing, and the first image alone may be the cause of one.
+const REFUSALS_AT_START: usize = 3;
+
 /// Outcome of the first question to a model.
 #[derive(Debug)]
 enum FirstQuestion {
-    /// No question has ended yet.
-    Pending,
+    /// No question has ended yet, except this number that were refused by the status alone.
+    Pending(usize),
     /// The question has a reply, or a failure that does not concern other questions.
     Ended,
     /// The question failed in a way in which every other question would fail too.
@@ -75,7 +83,9 @@ impl Remote {
             index: endpoint.add_model(&parameters.model),
             endpoint,
             parameters,
-            first_question: tokio::sync::Mutex::new(FirstQuestion::Pending),
+            first_question: tokio::sync::Mutex::new(FirstQuestion::Pending(0)),
+            has_answered: AtomicBool::new(false),
+            finish_words: FinishWords::default(),
             streams: StreamFallback::default(),
             warned_unconstrained: AtomicBool::new(false),
         })
@@ -171,14 +181,14 @@ impl Remote {
             AskedBefore::default()
         };
         let mut first_question = self.first_question.lock().await;
-        match &*first_question {
-            FirstQuestion::Pending => {}
+        let refused = match &*first_question {
+            FirstQuestion::Pending(refused) => *refused,
             FirstQuestion::Ended => {
                 drop(first_question);
                 return self
-                    .ask_adapting(message, choices, reservation, before)
+                    .ask_settled(message, choices, reservation, before)
                     .await
-                    .map_err(|error| resolve_alike(error, Reach::Trial));
+                    .map_err(|error| self.resolve_reach(error, Reach::Trial, 0));
             }
             FirstQuestion::Refused(error) => {
                 return Err(AskError {
@@ -187,24 +197,73 @@ impl Remote {
                     ..error.clone()
                 });
             }
-        }
+        };
         let outcome = self
-            .ask_adapting(message, choices, reservation, before)
+            .ask_settled(message, choices, reservation, before)
             .await
-            .map_err(|error| resolve_alike(error, Reach::Endpoint));
+            .map_err(|error| self.resolve_reach(error, Reach::Endpoint, refused));
         *first_question = match &outcome {
             Err(error) if error.reach == Reach::Endpoint => FirstQuestion::Refused(error.clone()),
-            Err(error) if error.reach == Reach::Interrupted => FirstQuestion::Pending,
+            Err(error) if error.reach == Reach::ByStatus => FirstQuestion::Pending(refused + 1),
+            Err(error) if error.reach == Reach::Interrupted => FirstQuestion::Pending(refused),
             _ => FirstQuestion::Ended,
         };
         outcome
     }
 
-    /// Asks a question, and again after each adaptation of a refused field, or as a stream after a gateway timeout.
+    /// Decides which requests a failure affects. Before the first reply, [`Reach::Alike`] becomes `alike`; and [`Reach::ByStatus`] is
+    /// every request, if the status speaks of the key, the credit or the address, or if `refused` earlier questions make it
+    /// [`REFUSALS_AT_START`]. After the first reply, such a status may concern one question.
+    fn resolve_reach(&self, error: AskError, alike: Reach, refused: usize) -> AskError {
+        let reach = match error.reach {
+            Reach::Alike => alike,
+            Reach::ByStatus if !self.has_answered.load(Ordering::Relaxed) => {
+                // A refusal that may concern the content has its words.
+                if error.refusal.is_none() || refused + 1 >= REFUSALS_AT_START {
+                    Reach::Endpoint
+                } else {
+                    Reach::ByStatus
+                }
+            }
+            reach => reach,
+        };
+        AskError { reach, ..error }
+    }
+
+    /// Asks a question, and once more if the reply may end in another way.
+    async fn ask_settled(
+        &self,
+        message: Message<'_>,
+        choices: usize,
+        reservation: Option<&Reservation>,
+        before: AskedBefore,
+    ) -> Result<Reply, AskError> {
+        let first = self
+            .ask_adapting(message, choices, 0, reservation, before)
+            .await?;
+        self.has_answered.store(true, Ordering::Relaxed);
+        if !first.may_heal {
+            return Ok(first);
+        }
+        let mut lost = first.lost;
+        lost.add(first.usage);
+        let may_pay = self.endpoint.may_pay_again(lost.attempts);
+        self.finish_words
+            .settle(first, may_pay, || async {
+                self.endpoint.wait_to_ask_again().await;
+                self.ask_adapting(message, choices, lost.attempts, reservation, before)
+                    .await
+            })
+            .await
+    }
+
+    /// Asks a question, and again after each adaptation of a refused field, or as a stream after a gateway timeout. `paid` is the number of
+    /// its earlier charged attempts.
     async fn ask_adapting(
         &self,
         message: Message<'_>,
         choices: usize,
+        paid: u32,
         reservation: Option<&Reservation>,
         mut before: AskedBefore,
     ) -> Result<Reply, AskError> {
@@ -218,7 +277,7 @@ impl Remote {
                 .after_timeout(&self.parameters, wire, before, paid_retries);
             let sent = RequestFields { wire, ..fields };
             let outcome = self
-                .ask_with(sent, timeouts, message, choices, reservation)
+                .ask_with(sent, timeouts, message, choices, paid, reservation)
                 .await;
             if let Err(error) = &outcome {
                 let mut forced = self.forced.lock().unwrap_or_else(PoisonError::into_inner);
@@ -292,6 +351,7 @@ impl Remote {
         timeouts: AfterTimeout,
         message: Message<'_>,
         choices: usize,
+        paid_before: u32,
         reservation: Option<&Reservation>,
     ) -> Result<Reply, AskError> {
         let parameters = &self.parameters;
@@ -318,6 +378,7 @@ impl Remote {
             },
             affinity: image_hash(message),
             timeouts,
+            paid_before,
             reservation,
         };
         self.endpoint.ask(&request).await
@@ -380,6 +441,17 @@ impl Remote {
         body: &[u8],
         fields: RequestFields,
     ) -> Option<AdaptableField> {
+        self.refusal_in_batch(status, body, fields).refused_field
+    }
+
+    /// True if a line of a batch may have been refused for its content alone.
+    pub(super) fn may_refuse_content(&self, status: u16, body: &[u8]) -> bool {
+        let failed = self.refusal_in_batch(status, body, self.fields());
+        failed.reach == Reach::Trial && failed.may_be_content(status)
+    }
+
+    /// The refusal of a line of a batch with these fields.
+    fn refusal_in_batch(&self, status: u16, body: &[u8], fields: RequestFields) -> AskError {
         let sent = SentFields {
             parameters: &self.parameters,
             fields,
@@ -388,7 +460,7 @@ impl Remote {
         };
         let wire = fields.wire.in_batch();
         let api_error = wire.parse_error(body);
-        AskError::refused(status, &api_error, wire, sent).refused_field
+        AskError::refused(status, &api_error, wire, sent)
     }
 
     /// Letter in a constrained reply, otherwise the whole text. Warns once if the server does not follow the constraint.
@@ -407,14 +479,6 @@ impl Remote {
             }
             text
         })
-    }
-}
-
-/// Replaces [`Reach::Alike`] by `reach`; other errors are unchanged.
-fn resolve_alike(error: AskError, reach: Reach) -> AskError {
-    match error.reach {
-        Reach::Alike => AskError { reach, ..error },
-        _ => error,
     }
 }
 

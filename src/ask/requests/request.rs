@@ -32,6 +32,8 @@ pub(in crate::ask) struct Request<'a> {
     pub(in crate::ask) affinity: u64,
     /// Handling of gateway timeouts.
     pub(in crate::ask) timeouts: AfterTimeout,
+    /// Number of earlier attempts at the question that were charged and gave no reply that counts.
+    pub(in crate::ask) paid_before: u32,
     /// Reservation of the cost of each attempt; `None` if the model has no known price.
     pub(in crate::ask) reservation: Option<&'a Reservation>,
 }

@@ -2,13 +2,13 @@
 
 use serde_json::Value;
 
-use super::finish_reason;
+use super::finish_reason::{self, Ending};
 use super::json_body;
 use super::logprobs;
 use super::stream;
 use super::usage;
 use crate::ask::failures::{ApiError, ReplyError, Unreadable, Wording};
-use crate::types::{Finish, Reply, TokenChances, Usage};
+use crate::types::{Finish, Reply, Thought, TokenChances, Usage};
 
 /// Parses a response body; `latency_ms` and `attempts` remain zero.
 ///
@@ -19,7 +19,8 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, ReplyError>
     let completion = parse(&json_body::text(body), content_type)?;
     // A completion may have a field "message", so only the field `error` counts there.
     let api_error = match completion.get("choices") {
-        Some(_) => ApiError::in_error(&completion),
+        Some(Value::Array(choices)) if !choices.is_empty() => ApiError::in_error(&completion),
+        Some(_) => ApiError::in_error(&completion).or_else(|| ApiError::in_structure(&completion)),
         None => ApiError::from_json(&completion),
     };
     if let Some(api_error) = api_error {
@@ -32,7 +33,7 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, ReplyError>
         return Err(ReplyError::Api(Box::new(ApiError::from_error(error))));
     }
     let reason = choice.get("finish_reason").and_then(Value::as_str);
-    let finish = finish_reason::read(reason.unwrap_or_default(), usage)
+    let Ending { finish, may_heal } = finish_reason::read(reason.unwrap_or_default(), usage)
         .map_err(|incomplete| error_in_text(choice).unwrap_or_else(|| incomplete.into()))?;
     let message = choice
         .get("message")
@@ -49,10 +50,14 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, ReplyError>
         .filter(|text| !text.is_empty())
         .map(str::to_owned)
         .or(refusal_part);
-    let is_empty = text.is_empty() && refusal.is_none() && !logprobs::has_reasoning(message);
-    if is_empty && is_lost(&finish, usage) {
+    let is_empty = text.trim().is_empty() && refusal.is_none();
+    let has_thought =
+        is_empty && logprobs::thought(message, completion.get("usage"), &text) == Thought::Before;
+    if is_empty && !has_thought && is_lost(&finish, usage) {
         return Err(unreadable(LOST).into());
     }
+    // The answer after the thoughts may have been lost, or the model gave none.
+    let may_heal = may_heal || (has_thought && is_end(&finish));
     Ok(Reply {
         refusal,
         finish,
@@ -61,6 +66,7 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, ReplyError>
         provider: json_body::string_field(&completion, "provider"),
         attempts: 0,
         chances,
+        may_heal,
         ..Reply::local(text)
     })
 }
@@ -134,7 +140,12 @@ const LOST: &str = "an empty reply for which it counts no token, so that it was 
 /// True if a reply without content was lost in transit: the server calls it complete, but counts no tokens.
 fn is_lost(finish: &Finish, usage: Option<Usage>) -> bool {
     let tokens = usage.map(|usage| usage.completion_tokens);
-    matches!(finish, Finish::Stop | Finish::Unknown) && matches!(tokens, Some(Some(0)))
+    is_end(finish) && matches!(tokens, Some(Some(0)))
+}
+
+/// True if the server calls a reply complete, or says nothing about its end.
+pub(super) fn is_end(finish: &Finish) -> bool {
+    matches!(finish, Finish::Stop | Finish::Unknown)
 }
 
 #[cfg(test)]
@@ -218,7 +229,7 @@ mod tests {
             ("content_filter", Finish::Filter),
             ("refusal", Finish::Filter),
         ] {
-            assert_eq!(finish_reason::read(reason, None), Ok(finish));
+            assert_eq!(finish_reason::read(reason, None).unwrap().finish, finish);
         }
     }
 
@@ -302,7 +313,7 @@ mod tests {
                 else {
                     panic!("{content} {usage}");
                 };
-                assert!(lost.description.contains("lost") && !lost.is_final);
+                assert!(lost.description.contains("lost"));
             }
         }
         let ended = r#"{"prompt_tokens":300,"completion_tokens":1}"#;
@@ -312,6 +323,22 @@ mod tests {
         );
         assert!(json(&reply_body("null", "length", none)).is_ok());
         assert!(json(&reply_body("\"B\"", "stop", none)).is_ok());
+    }
+
+    #[test]
+    fn thoughts_without_an_answer_may_heal() {
+        let thought = |content: &str, reasoning: &str, finish: &str, reasoning_tokens: u32| {
+            json(&format!(
+                r#"{{"choices":[{{"finish_reason":"{finish}","message":{{"content":"{content}","reasoning_content":"{reasoning}"}}}}],"usage":{{"completion_tokens":9,"completion_tokens_details":{{"reasoning_tokens":{reasoning_tokens}}}}}}}"#
+            ))
+            .unwrap()
+        };
+        assert!(thought("", "A? B?", "stop", 0).may_heal);
+        assert!(thought(" ", "", "stop", 7).may_heal);
+        assert!(!thought("B", "A? B?", "stop", 7).may_heal);
+        assert!(!thought("", "A? B?", "length", 7).may_heal);
+        assert!(!thought("", "", "stop", 0).may_heal);
+        assert!(thought("", "", "zeitgeist", 0).may_heal);
     }
 
     #[test]

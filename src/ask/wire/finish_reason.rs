@@ -1,4 +1,8 @@
 //! Parsing of the finish reason that a server sends: [`read`], with the known reasons in `finish_reasons.toml`.
+//!
+//! A reply that the server ended deliberately and would end so again, by a filter, a limit or a loop, is the model's: it is scored as
+//! unread and asked once. A generation that the server gave up is a failure and asked again. A word in no list may mean either;
+//! [`FinishWords`](crate::ask::models) decides it by a second try, so that a vendor's choice of words moves no accuracy.
 
 use std::sync::LazyLock;
 
@@ -12,10 +16,11 @@ use crate::types::{Finish, Usage};
 #[serde(deny_unknown_fields)]
 struct Reasons {
     stop: Vec<String>,
-    other: Vec<String>,
     length: Vec<String>,
     filter: Vec<String>,
     context: Vec<String>,
+    #[serde(rename = "loop")]
+    loops: Vec<String>,
     broken: Vec<String>,
 }
 
@@ -23,50 +28,55 @@ struct Reasons {
 static REASONS: LazyLock<Reasons> =
     LazyLock::new(|| toml::from_str(include_str!("finish_reasons.toml")).unwrap_or_default());
 
+/// The end of a reply, as a server states it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Ending {
+    pub(super) finish: Finish,
+    /// True if the reason is not known, so that another try may end in another way.
+    pub(super) may_heal: bool,
+}
+
 /// Parses a server's finish reason; an empty one is [`Finish::Unknown`].
 ///
 /// # Errors
-/// If the reason means that the reply is incomplete, or if the reason is unknown. The error includes `usage`, the tokens charged.
-pub(super) fn read(reason: &str, usage: Option<Usage>) -> Result<Finish, Unreadable> {
-    let name = reason.trim().to_ascii_lowercase().replace('-', "_");
+/// If the server gave the generation up. The error includes `usage`, the tokens charged.
+pub(super) fn read(reason: &str, usage: Option<Usage>) -> Result<Ending, Unreadable> {
+    let name = Finish::normalized(reason);
     let reasons = &*REASONS;
-    if name.is_empty() {
-        Ok(Finish::Unknown)
+    let other = Finish::Other(reason.trim().to_owned());
+    let finish = if name.is_empty() {
+        Finish::Unknown
     } else if reasons.stop.contains(&name) {
-        Ok(Finish::Stop)
-    } else if reasons.other.contains(&name) {
-        Ok(Finish::Other(reason.to_owned()))
+        Finish::Stop
     } else if reasons.length.contains(&name) {
-        Ok(Finish::Length)
+        Finish::Length
     } else if reasons.filter.contains(&name) {
-        Ok(Finish::Filter)
-    } else if reasons.context.contains(&name) {
-        Err(Unreadable {
-            usage,
-            is_final: true,
-            finish: Some(reason.to_owned()),
-            ..Unreadable::new(format!(
-                "a reply that ended at the model's context length: its finish_reason is {reason:?} (send smaller images: --image max-side=N, or a \
-                 smaller --max-tokens)"
-            ))
-        })
+        Finish::Filter
+    } else if reasons.context.contains(&name) || reasons.loops.contains(&name) || other.is_whole() {
+        other
     } else if reasons.broken.contains(&name) {
-        Err(Unreadable {
+        return Err(Unreadable {
             usage,
             finish: Some(reason.to_owned()),
             ..Unreadable::new(format!(
                 "a reply that broke off: its finish_reason is {reason:?}"
             ))
-        })
+        });
     } else {
-        Err(Unreadable {
-            usage,
-            finish: Some(reason.to_owned()),
-            ..Unreadable::new(format!(
-                "a reply whose finish_reason {reason:?} is not known, so that it may have broken off"
-            ))
-        })
-    }
+        return Ok(Ending {
+            finish: other,
+            may_heal: true,
+        });
+    };
+    Ok(Ending {
+        finish,
+        may_heal: false,
+    })
+}
+
+/// True if a finish reason means that prompt and reply are as long as the model's context.
+pub(crate) fn is_context_full(word: &str) -> bool {
+    REASONS.context.contains(&Finish::normalized(word))
 }
 
 #[cfg(test)]
@@ -77,18 +87,29 @@ mod tests {
     fn each_reason_is_listed_once() {
         let Reasons {
             stop,
-            other,
             length,
             filter,
             context,
+            loops,
             broken,
         } = toml::from_str(include_str!("finish_reasons.toml")).unwrap();
-        let mut all = [stop, other, length, filter, context, broken].concat();
+        let mut all = [stop, length, filter, context, loops, broken].concat();
         let count = all.len();
         all.sort();
         all.dedup();
         assert_eq!(all.len(), count);
-        assert!(all.iter().all(|word| *word == word.to_ascii_lowercase()));
+        assert!(all.iter().all(|word| *word == Finish::normalized(word)));
+        assert!(
+            all.iter()
+                .all(|word| !Finish::Other(word.clone()).is_whole())
+        );
+    }
+
+    fn certain(finish: Finish) -> Result<Ending, Unreadable> {
+        Ok(Ending {
+            finish,
+            may_heal: false,
+        })
     }
 
     #[test]
@@ -98,47 +119,51 @@ mod tests {
             "Cancelled",
             "network_error",
             "insufficient-system-resource",
-            "MALFORMED_FUNCTION_CALL",
         ] {
             let broken = read(word, None).unwrap_err();
-            assert!(
-                !broken.is_final && broken.description.contains("broke off"),
-                "{word}"
-            );
+            assert!(broken.description.contains("broke off"), "{word}");
         }
     }
 
     #[test]
-    fn full_context_is_a_final_error() {
-        assert!(
-            read("model_context_window_exceeded", None)
-                .unwrap_err()
-                .is_final
-        );
+    fn words_of_context_and_loops_are_kept() {
+        for word in ["model_context_window_exceeded", "Repetition", "repeat"] {
+            assert_eq!(read(word, None), certain(Finish::Other(word.to_owned())));
+        }
+        assert!(is_context_full("MODEL-LENGTH") && !is_context_full("length"));
     }
 
     #[test]
-    fn unknown_reason_is_an_error() {
-        let unknown = read("zeitgeist", None).unwrap_err();
-        assert!(unknown.description.contains("\"zeitgeist\" is not known"));
+    fn unknown_reason_is_doubtful() {
+        for word in [
+            "zeitgeist",
+            "MALFORMED_FUNCTION_CALL",
+            "NO_IMAGE",
+            "language",
+        ] {
+            let ending = read(word, None).unwrap();
+            assert_eq!(ending.finish, Finish::Other(word.to_owned()));
+            assert!(ending.may_heal && !ending.finish.is_whole());
+        }
     }
 
     #[test]
     fn known_reasons_are_parsed_in_any_case() {
-        assert_eq!(read("END_TURN", None), Ok(Finish::Stop));
+        assert_eq!(read("END_TURN", None), certain(Finish::Stop));
         assert_eq!(
             read("tool_use", None),
-            Ok(Finish::Other("tool_use".to_owned()))
+            certain(Finish::Other("tool_use".to_owned()))
         );
-        assert_eq!(read("MAX_TOKENS", None), Ok(Finish::Length));
+        assert_eq!(read("MAX_TOKENS", None), certain(Finish::Length));
         for word in [
             "SAFETY",
             "RECITATION",
             "PROHIBITED_CONTENT",
             "guardrail_intervened",
+            "sensitive",
         ] {
-            assert_eq!(read(word, None), Ok(Finish::Filter), "{word}");
+            assert_eq!(read(word, None), certain(Finish::Filter), "{word}");
         }
-        assert_eq!(read("", None), Ok(Finish::Unknown));
+        assert_eq!(read("", None), certain(Finish::Unknown));
     }
 }

@@ -27,6 +27,7 @@ use crate::error::{Error, Result};
 use crate::types::{Reply, Usage};
 
 pub(super) use charge::cost_in_headers;
+pub(crate) use finish_reason::is_context_full;
 pub(super) use refusal::requested_wire;
 pub(super) use usage::with_cost;
 

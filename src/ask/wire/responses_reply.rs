@@ -2,8 +2,8 @@
 
 use serde_json::Value;
 
-use super::chat_reply::words;
-use super::finish_reason;
+use super::chat_reply::{is_end, words};
+use super::finish_reason::{self, Ending};
 use super::json_body;
 use super::logprobs;
 use super::stream;
@@ -31,7 +31,7 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, ReplyError>
         return Err(ReplyError::Api(Box::new(api_error)));
     }
     let usage = usage::in_body(&response);
-    let finish = finish(&response, usage)?;
+    let Ending { finish, may_heal } = finish(&response, usage)?;
     let items = response
         .get("output")
         .and_then(Value::as_array)
@@ -45,6 +45,11 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, ReplyError>
     }
     let (text, refusal) = text_and_refusal(items);
     let chances = chances(items, &response, &text);
+    let has_thought = has_summary(items)
+        || logprobs::thought(&response, response.get("usage"), &text) == Thought::Before;
+    // The answer after the thoughts may have been lost, or the model gave none.
+    let is_empty = text.trim().is_empty() && refusal.is_empty();
+    let may_heal = may_heal || (is_empty && has_thought && is_end(&finish));
     Ok(Reply {
         refusal: Some(refusal).filter(|text| !text.is_empty()),
         finish,
@@ -53,6 +58,7 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, ReplyError>
         provider: json_body::string_field(&response, "provider"),
         attempts: 0,
         chances,
+        may_heal,
         ..Reply::local(text)
     })
 }
@@ -72,11 +78,17 @@ fn last_response(stream: &str) -> Option<Value> {
 ///
 /// # Errors
 /// If the response has not ended.
-fn finish(response: &Value, usage: Option<Usage>) -> Result<Finish, ReplyError> {
+fn finish(response: &Value, usage: Option<Usage>) -> Result<Ending, ReplyError> {
     let status = owned_text(response.get("status")).unwrap_or_default();
     match &*status {
-        "" => Ok(Finish::Unknown),
-        "completed" => Ok(Finish::Stop),
+        "" | "completed" => Ok(Ending {
+            finish: if status.is_empty() {
+                Finish::Unknown
+            } else {
+                Finish::Stop
+            },
+            may_heal: false,
+        }),
         "incomplete" => {
             let details = response.get("incomplete_details");
             let reason = owned_text(details.and_then(|details| details.get("reason")));
@@ -106,18 +118,22 @@ fn chances(items: &[Value], response: &Value, text: &str) -> Option<TokenChances
         .map(|part| part.get("logprobs"))
         .find_map(logprobs::positions)?;
     let thought = logprobs::thought(response, response.get("usage"), text);
-    let has_summary = items
-        .iter()
-        .filter_map(|item| item.get("summary")?.as_array())
-        .any(|summary| !summary.is_empty());
     Some(TokenChances {
         positions,
-        thought: if has_summary {
+        thought: if has_summary(items) {
             Thought::Before
         } else {
             thought
         },
     })
+}
+
+/// True if a response has a summary of the model's reasoning.
+fn has_summary(items: &[Value]) -> bool {
+    items
+        .iter()
+        .filter_map(|item| item.get("summary")?.as_array())
+        .any(|summary| !summary.is_empty())
 }
 
 /// Text of the messages in a response, and the text of the refusals in them.
@@ -197,13 +213,21 @@ mod tests {
     }
 
     #[test]
+    fn doubtful_ends_may_heal() {
+        for body in [
+            r#"{"status":"incomplete","output":[]}"#,
+            r#"{"status":"incomplete","incomplete_details":{"reason":"zeitgeist"},"output":[]}"#,
+            r#"{"status":"completed","output":[{"type":"reasoning","summary":[{"text":"A?"}]}]}"#,
+            r#"{"status":"completed","output":[{"type":"message","content":[]}],"usage":{"output_tokens_details":{"reasoning_tokens":5}}}"#,
+        ] {
+            assert!(json(body).unwrap().may_heal, "{body}");
+        }
+    }
+
+    #[test]
     fn incomplete_responses_are_described() {
         for (body, expected) in [
             (r#"{"status":"in_progress","output":[]}"#, "in_progress"),
-            (
-                r#"{"status":"incomplete","output":[]}"#,
-                "\"incomplete\" is not known",
-            ),
             (
                 r#"{"status":"completed","output":[],"usage":{"output_tokens":9}}"#,
                 "without an output",

@@ -2,6 +2,7 @@
 
 use serde_json::{Map, Value, json};
 
+use crate::ask::failures::find_error;
 use crate::ask::replies::bounded_json::{MAX_ITEMS, parse};
 
 /// True if a body is an event stream, by its content type or its first characters.
@@ -108,10 +109,18 @@ fn error_event(event: &Value) -> Option<Value> {
     if event.get("error").is_some_and(|error| !error.is_null()) {
         return Some(event.clone());
     }
-    ["type", "object"]
+    let is_named = ["type", "object"]
         .iter()
-        .any(|field| event.get(field).is_some_and(|kind| kind == "error"))
-        .then(|| json!({"error": event}))
+        .any(|field| event.get(field).is_some_and(|kind| kind == "error"));
+    if is_named {
+        return Some(json!({"error": event}));
+    }
+    let has_choices = event
+        .get("choices")
+        .and_then(Value::as_array)
+        .is_some_and(|choices| !choices.is_empty());
+    let error = find_error(event).filter(|_| !has_choices)?;
+    Some(json!({"error": error}))
 }
 
 /// A choice joined from its chunks.

@@ -101,8 +101,9 @@ pub fn read(reply: &str, choices: &Choices, mode: ParsingMode) -> Answer {
 
 /// The strict and the lenient parsing of a reply, in this order. Unlike [`read`], it considers how the reply ended.
 ///
-/// A choice that the strict parsing finds always counts. Otherwise a separate refusal, a content filter and the token limit decide, in
-/// this order. A truncated explanation is not parsed leniently, because it could still have ended in another choice.
+/// A choice that the strict parsing finds always counts. Otherwise a content filter, a separate refusal and the token limit decide, in
+/// this order. A truncated explanation is not parsed leniently, because it could still have ended in another choice; nor is a text that
+/// the server ended early for another reason.
 #[must_use]
 pub fn readings(reply: &Reply, choices: &Choices) -> (Answer, Answer) {
     let strict = read(&reply.text, choices, ParsingMode::Strict);
@@ -110,12 +111,13 @@ pub fn readings(reply: &Reply, choices: &Choices) -> (Answer, Answer) {
         return (strict, strict);
     }
     let reason = match &reply.finish {
-        _ if reply.refusal.is_some() => UnreadReason::Refused,
         Finish::Filter => UnreadReason::Filtered,
+        _ if reply.refusal.is_some() => UnreadReason::Refused,
         Finish::Length => UnreadReason::Truncated,
-        Finish::Stop | Finish::Other(_) | Finish::Unknown => {
+        finish if finish.is_whole() => {
             return (strict, read(&reply.text, choices, ParsingMode::Lenient));
         }
+        _ => return (strict, strict),
     };
     (Answer::Unparsed(reason), Answer::Unparsed(reason))
 }

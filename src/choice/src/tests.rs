@@ -205,9 +205,22 @@ fn finish_and_refusal_are_considered() {
         ),
         (
             "",
+            Finish::Filter,
+            Some("400: it violates our policy"),
+            Answer::Unparsed(UnreadReason::Filtered),
+        ),
+        (
+            "",
             Finish::Other("x".into()),
             None,
             Answer::Unparsed(UnreadReason::Empty),
+        ),
+        ("B", Finish::Other("x".into()), None, Answer::Chosen(1)),
+        (
+            "The answer is B",
+            Finish::Other("x".into()),
+            None,
+            Answer::Unparsed(UnreadReason::NoChoice),
         ),
     ] {
         let reply = Reply {
@@ -217,11 +230,16 @@ fn finish_and_refusal_are_considered() {
         };
         assert_eq!(readings(&reply, &rooms), (want, want), "{reply:?}");
     }
-    let sentence = Reply::local("It is B.".to_owned());
-    assert_eq!(
-        readings(&sentence, &rooms),
-        (Answer::Unparsed(UnreadReason::NoChoice), Answer::Chosen(1))
-    );
+    for finish in [Finish::Stop, Finish::Other("TOOL_CALLS".into())] {
+        let sentence = Reply {
+            finish,
+            ..Reply::local("It is B.".to_owned())
+        };
+        assert_eq!(
+            readings(&sentence, &rooms),
+            (Answer::Unparsed(UnreadReason::NoChoice), Answer::Chosen(1))
+        );
+    }
 }
 
 #[test]

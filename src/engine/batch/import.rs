@@ -46,7 +46,7 @@ impl<'a, D: Detail> Driver<'a, D> {
     fn import_files(&mut self, part: usize, ended: Option<&str>) -> Result<(ReplyCounts, usize)> {
         let (paths, keys) = (self.output_paths(part), self.keys(part)?);
         let models = self.models_of(part);
-        let mut refused = BTreeSet::new();
+        let (mut refused, mut content) = (BTreeSet::new(), BTreeSet::new());
         let (mut is_adapted, mut unparsed) = (false, 0);
         let server = self.servers.server(&self.part(part).facts)?;
         let mut replies = ReplyImport::new(self.store, self.manifest)?;
@@ -75,9 +75,20 @@ impl<'a, D: Detail> Driver<'a, D> {
                         for model in &models {
                             is_adapted |= model.adapt_to_refusal(*status, body.as_bytes());
                         }
+                        if models
+                            .iter()
+                            .any(|model| model.may_refuse_content(*status, body.as_bytes()))
+                        {
+                            content.insert(key);
+                        }
                     }
                 }
                 _ => {}
+            }
+        }
+        if !is_adapted {
+            for key in replies.filter_refused(&content)? {
+                refused.remove(&key);
             }
         }
         if let Some(state) = ended {

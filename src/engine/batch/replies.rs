@@ -12,10 +12,12 @@ use crate::ask::{Constrain, TokenBound};
 use crate::error::{Error, Result};
 use crate::files::reading;
 use crate::runs::changed_settings;
-use crate::store::Store;
+use crate::store::{Store, StoredTrial};
 use crate::types::flags::read_word;
 use crate::types::manifests::RunManifest;
-use crate::types::{Failure, FailureKind, LostAttempts, Record, Reply, TrialKey, Unstated, Usage};
+use crate::types::{
+    Failure, FailureKind, Finish, LostAttempts, Record, Reply, TrialKey, Unstated, Usage,
+};
 use darkqa_score::answers::record::{Detail, answered};
 
 /// Numbers of lines by outcome.
@@ -36,6 +38,8 @@ pub(super) struct ReplyImport<'a, D> {
     /// Records of the trials in batches, without outcomes.
     blanks: HashMap<TrialKey, Record<D>>,
     waiting: BTreeSet<TrialKey>,
+    /// Trials with an earlier reply that did not count, because another try might have ended in another way.
+    asked_again: BTreeSet<TrialKey>,
     /// The first failure of each waiting trial. It is stored at the end, because a later line may have the reply.
     failures: BTreeMap<TrialKey, FailedTrial<D>>,
     pub(super) counts: ReplyCounts,
@@ -45,6 +49,8 @@ pub(super) struct ReplyImport<'a, D> {
 struct FailedTrial<D> {
     blank: Record<D>,
     failure: Failure,
+    /// Finish reason of a reply that does not count.
+    finish: Option<Finish>,
 }
 
 impl<'a, D: Detail> ReplyImport<'a, D> {
@@ -54,6 +60,12 @@ impl<'a, D: Detail> ReplyImport<'a, D> {
         Ok(Self {
             blanks: blanks.map(|blank| (blank.key, blank)).collect(),
             waiting: store.pending_in_batches()?,
+            asked_again: store
+                .trials()?
+                .iter()
+                .filter(|trial| trial.may_heal())
+                .map(|trial| trial.key)
+                .collect(),
             failures: BTreeMap::new(),
             store,
             manifest,
@@ -82,11 +94,24 @@ impl<'a, D: Detail> ReplyImport<'a, D> {
                 if line.charged.is_none() && may_be_charged(failure.kind) {
                     blank.lost.unstated = bound;
                 }
-                self.failures
-                    .insert(blank.key, FailedTrial { blank, failure });
+                let failed = FailedTrial {
+                    blank,
+                    failure,
+                    finish: None,
+                };
+                self.failures.insert(failed.blank.key, failed);
                 return Ok(());
             }
         };
+        // A word that is not known means a broken generation or the model's own end: the next batch asks once more. A trial that ends so
+        // twice is the model's.
+        if reply.may_heal && !self.asked_again.contains(&blank.key) {
+            if !has_failed {
+                let failed = FailedTrial::from_doubtful(blank, bound, reply);
+                self.failures.insert(failed.blank.key, failed);
+            }
+            return Ok(());
+        }
         self.waiting.remove(&blank.key);
         if self.failures.remove(&blank.key).is_some() {
             self.counts.imported_before += 1;
@@ -119,7 +144,12 @@ impl<'a, D: Detail> ReplyImport<'a, D> {
         {
             let mut blank = blank.clone().in_batch();
             blank.lost = LostAttempts::default();
-            self.failures.insert(key, FailedTrial { blank, failure });
+            let failed = FailedTrial {
+                blank,
+                failure,
+                finish: None,
+            };
+            self.failures.insert(key, failed);
         }
     }
 
@@ -130,6 +160,49 @@ impl<'a, D: Detail> ReplyImport<'a, D> {
             .map(|(key, failed)| (*key, failed.failure.kind))
     }
 
+    /// Decides about trials that may have been refused for their content, if the run has answers to others. Refused before in the same
+    /// words, a trial is stored as a reply that a filter withheld; else it is asked once more. Returns the trials that are not to be left
+    /// out of the next batch.
+    pub(super) fn filter_refused(&mut self, content: &BTreeSet<TrialKey>) -> Result<Vec<TrialKey>> {
+        if content.is_empty() || self.store.trials()?.iter().all(StoredTrial::failed) {
+            return Ok(Vec::new());
+        }
+        let earlier: BTreeMap<TrialKey, String> = self
+            .store
+            .records()?
+            .into_iter()
+            .filter(|record| content.contains(&record.key))
+            .filter_map(|record| {
+                let failure = record.failure?;
+                (failure.kind == FailureKind::Request).then_some((record.key, failure.message))
+            })
+            .collect();
+        for key in content {
+            let is_same =
+                |failed: &&FailedTrial<D>| earlier.get(key) == Some(&failed.failure.message);
+            if self
+                .failures
+                .get(key)
+                .as_ref()
+                .is_none_or(|failed| !is_same(failed))
+            {
+                continue;
+            }
+            if let Some(FailedTrial { blank, failure, .. }) = self.failures.remove(key) {
+                let reply = Reply {
+                    refusal: Some(refusal_words(&failure)),
+                    finish: Finish::Filter,
+                    lost: blank.lost,
+                    ..Reply::local(String::new())
+                };
+                self.waiting.remove(key);
+                self.counts.answered += 1;
+                self.store.append(&answered(blank, reply)?)?;
+            }
+        }
+        Ok(content.iter().copied().collect())
+    }
+
     /// Number of waiting trials without a reply or failure.
     fn waiting(&self) -> usize {
         self.waiting.len() - self.failures.len()
@@ -137,12 +210,52 @@ impl<'a, D: Detail> ReplyImport<'a, D> {
 
     /// Stores the failures, and syncs the records to disk; returns the numbers of lines.
     pub(super) fn finish(mut self) -> Result<ReplyCounts> {
-        for FailedTrial { blank, failure } in std::mem::take(&mut self.failures).into_values() {
+        for failed in std::mem::take(&mut self.failures).into_values() {
             self.counts.failed += 1;
-            self.store.append(&blank.with_failure(failure, 1))?;
+            let record = failed.blank.with_failure(failed.failure, 1);
+            self.store.append(&Record {
+                finish: failed.finish,
+                ..record
+            })?;
         }
         self.store.sync()?;
         Ok(self.counts)
+    }
+}
+
+impl<D> FailedTrial<D> {
+    /// A trial whose reply may end in another way at another try; `bound` is the bound of its tokens.
+    fn from_doubtful(mut blank: Record<D>, bound: Unstated, reply: Reply) -> Self {
+        blank.lost.add(reply.usage);
+        if reply.usage.is_none() {
+            blank.lost.unstated = bound;
+        }
+        let end = match &reply.finish {
+            Finish::Other(word) => format!("a finish_reason {word:?} that is not known"),
+            _ => "thoughts and no answer".to_owned(),
+        };
+        let failure = Failure {
+            kind: FailureKind::Response,
+            status: None,
+            message: format!("the batch says: {end}; asked once more"),
+        };
+        Self {
+            blank,
+            failure,
+            finish: Some(reply.finish.shorten()),
+        }
+    }
+}
+
+/// Status and words of a refusal, as those of a single request are stored.
+fn refusal_words(failure: &Failure) -> String {
+    let words = failure.message.trim_start_matches("the batch says: ");
+    match failure.status {
+        Some(status) => {
+            let words = words.trim_start_matches(&status.to_string()).trim_start();
+            format!("{status}: {words}")
+        }
+        None => words.to_owned(),
     }
 }
 

@@ -25,7 +25,7 @@ use crate::runs::over_budget::OverBudget;
 use crate::text::alert::{Alert, AlertKind};
 use crate::types::manifests::Status;
 use crate::types::text::{counted, plural};
-use crate::types::{FrameId, InputSummary, OpenDetail, StoredDetail as _};
+use crate::types::{FrameId, InputSummary, OpenDetail, StoredDetail as _, TrialRef};
 use darkqa_score::answers::record::Detail;
 use darkqa_score::cluster::{ClusterUnit, MIN_SCENES};
 use darkqa_score::comparisons::compares_models;
@@ -40,6 +40,7 @@ pub(super) fn alerts(combined: &Combined, findings: &Findings<'_>) -> Vec<Alert>
     let mut alerts = run_alerts(combined);
     alerts.extend(joining_alerts(combined));
     alerts.extend(replies::reply_alerts(&findings.health, "count as wrong"));
+    alerts.extend(unread_early_ends(combined, "count as wrong"));
     alerts.extend(replies::broken_off_alert(combined));
     alerts.extend(replies::people_alerts(combined));
     alerts.extend(images::image_alerts(combined));
@@ -81,6 +82,7 @@ pub(super) fn alerts_without_truths(
     let mut alerts = run_alerts(combined);
     alerts.extend(joining_alerts(combined));
     alerts.extend(replies::reply_alerts(&agreement.health, "do not agree"));
+    alerts.extend(unread_early_ends(combined, "do not agree"));
     alerts.extend(replies::broken_off_alert(combined));
     alerts.extend(parsing::parsing_alerts(combined));
     alerts.extend(constraints::constraint_alerts(
@@ -95,6 +97,25 @@ pub(super) fn alerts_without_truths(
     alerts.extend(dark_photographs_alert(agreement.set));
     alerts.sort_by_key(|alert| alert.kind);
     alerts
+}
+
+/// Alerts about replies that the server ended early, and that have no answer in the strict parsing.
+fn unread_early_ends(combined: &Combined, unread_as: &str) -> Vec<Alert> {
+    let is_unread = |trial: TrialRef<'_>| trial.strict().is_none_or(|strict| strict.why.is_some());
+    replies::ended_early_alerts(combined.trials.iter(), is_unread, unread_as)
+}
+
+/// Alerts about answers to open questions that the server ended early without any text: they get no mark.
+pub(super) fn open_early_ends(joined: &Joined<OpenDetail>) -> Vec<Alert> {
+    replies::ended_early_alerts(
+        joined.trials.iter().filter(|trial| trial.is_answer()),
+        |trial| {
+            let record = trial.record();
+            let has_text = record.reply.is_some_and(|reply| !reply.trim().is_empty());
+            record.refusal.is_some() || !has_text
+        },
+        "score 0",
+    )
 }
 
 /// Alert for a report with too many models for pairwise comparisons.

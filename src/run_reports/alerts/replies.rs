@@ -1,14 +1,17 @@
-//! Alerts about replies that are not scored, or are scored as wrong: [`reply_alerts`], [`broken_off_alert`], [`people_alerts`].
+//! Alerts about replies that are not scored, or are scored as wrong: [`reply_alerts`], [`ended_early_alerts`], [`broken_off_alert`],
+//! [`people_alerts`].
 
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
+use crate::ask::is_context_full;
 use crate::run_reports::combine::Combined;
 use crate::run_reports::settings::has_human_answers;
 use crate::text::alert::{Alert, AlertKind, MAX_UNREAD};
 use crate::text::outcome_words::failure_reason;
+use crate::types::degradations::AxisLevel;
 use crate::types::text::counted;
-use crate::types::{FailureKind, TrialRef, UnreadReason};
+use crate::types::{Condition, FailureKind, StoredDetail, TrialRef, UnreadReason};
 use darkqa_score::accuracies::Health;
 
 /// Alerts about replies that could not be parsed and about failed trials. `unread_as` completes the sentence about the former, for example
@@ -96,6 +99,71 @@ fn unread_in_condition(health: &Health, unread_as: &str) -> String {
         subject.model,
         subject.condition()
     )
+}
+
+/// Numbers of trials by level.
+type ByLevel = BTreeMap<Option<AxisLevel>, usize>;
+
+/// One alert for each model whose replies the server ended early, with the number for each of its words at each level: a filter or a loop
+/// may depend on the light. `counts` is true for the replies without an answer; `unread_as` completes the sentence about them.
+pub(super) fn ended_early_alerts<'t, D: StoredDetail + 't>(
+    trials: impl Iterator<Item = TrialRef<'t, D>>,
+    counts: impl Fn(TrialRef<'t, D>) -> bool,
+    unread_as: &str,
+) -> Vec<Alert> {
+    let mut models = BTreeMap::<&str, (ByLevel, BTreeMap<&str, ByLevel>)>::new();
+    for trial in trials.filter(|trial| !trial.failed()) {
+        let level = trial.condition().map(Condition::level);
+        let (replies, words) = models.entry(trial.model()).or_default();
+        *replies.entry(level).or_default() += 1;
+        if let Some(word) = trial.ended_early().filter(|_| counts(trial)) {
+            *words.entry(word).or_default().entry(level).or_default() += 1;
+        }
+    }
+    models
+        .into_iter()
+        .filter(|(_, (_, words))| !words.is_empty())
+        .map(|(model, (replies, words))| {
+            let count: usize = words.values().flat_map(BTreeMap::values).sum();
+            let all: usize = replies.values().sum();
+            let listed: Vec<String> = words
+                .iter()
+                .map(|(word, at)| format!("{word} {}", counts_by_level(at, &replies)))
+                .collect();
+            let text = format!(
+                "{count} of {all} replies of {model} ended early without an answer, and {unread_as}: {}.{}",
+                listed.join("; "),
+                early_end_remedies(words.keys().copied())
+            );
+            Alert::new(AlertKind::Unread, text)
+        })
+        .collect()
+}
+
+/// The number of a word at each level, of all replies there: `2 (L0 0 of 40, L5 2 of 40)`.
+fn counts_by_level(at: &ByLevel, replies: &ByLevel) -> String {
+    let levels: Vec<String> = replies
+        .iter()
+        .map(|(level, all)| {
+            let count = at.get(level).copied().unwrap_or(0);
+            let level = level.map_or_else(|| "no image".to_owned(), |level| level.to_string());
+            format!("{level} {count} of {all}")
+        })
+        .collect();
+    let count: usize = at.values().sum();
+    format!("{count} ({})", levels.join(", "))
+}
+
+/// Remedies for early ends that a setting of the run causes; empty without any.
+fn early_end_remedies<'w>(words: impl Iterator<Item = &'w str> + Clone) -> String {
+    let mut text = String::new();
+    if words.clone().any(|word| word == "length") {
+        text += " Those of length were cut at the token limit: the same command with a larger --max-tokens asks them again.";
+    }
+    if words.clone().any(is_context_full) {
+        text += " The model's context was full: send smaller images (--image max-side=N), or lower --max-tokens, in a new run.";
+    }
+    text
 }
 
 /// The alert about generations that broke off, with the number for each `finish_reason` of the server.

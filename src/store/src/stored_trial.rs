@@ -18,8 +18,8 @@ pub struct StoredTrial {
     #[serde(default)]
     pub via: Via,
     failure: Option<StoredFailure>,
-    #[serde(default, rename = "finish", deserialize_with = "is_length")]
-    is_truncated: bool,
+    #[serde(default, rename = "finish", deserialize_with = "read_end")]
+    end: End,
     /// The token limit of the reply, if it differs from that of the run's first call.
     max_tokens: Option<NonZeroU32>,
     #[serde(default)]
@@ -68,7 +68,12 @@ impl StoredTrial {
 
     /// True if the reply was truncated at a token limit below this one; `first` is that of the run's first call.
     pub fn is_truncated_below(&self, limit: u32, first: u32) -> bool {
-        self.is_truncated && !self.failed() && self.limit().unwrap_or(first) < limit
+        self.end == End::Length && !self.failed() && self.limit().unwrap_or(first) < limit
+    }
+
+    /// True if a reply came that does not count, because another try may end in another way.
+    pub fn may_heal(&self) -> bool {
+        self.failed() && self.end != End::Unknown
     }
 
     fn limit(&self) -> Option<u32> {
@@ -117,10 +122,26 @@ impl StoredTrial {
     }
 }
 
-/// Deserializes the reason why a model stopped; true for the token limit.
-fn is_length<'de, D: Deserializer<'de>>(deserializer: D) -> Result<bool, D::Error> {
+/// The reason why a model stopped, as far as a resumed run needs it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+enum End {
+    /// No reason: no reply came.
+    #[default]
+    Unknown,
+    /// The token limit.
+    Length,
+    /// Another reason.
+    Other,
+}
+
+/// Deserializes the reason why a model stopped.
+fn read_end<'de, D: Deserializer<'de>>(deserializer: D) -> Result<End, D::Error> {
     let finish = Option::<Finish>::deserialize(deserializer)?;
-    Ok(finish == Some(Finish::Length))
+    Ok(match finish {
+        None => End::Unknown,
+        Some(Finish::Length) => End::Length,
+        Some(_) => End::Other,
+    })
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! Endpoints: requests, replies, faults, replicas and costs.
 
 mod ask;
+mod early_ends;
 mod faults;
 mod gateways;
 mod money;

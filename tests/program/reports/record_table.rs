@@ -205,7 +205,7 @@ fn record_table_keeps_odd_texts() {
     let bench = Bench::with_questions(4);
     let refused = json!({"role": "assistant", "content": null, "refusal": "I won't \u{1b}[1m."});
     let endpoint = MockEndpoint::start([
-        Answer::error(400, "invalid_image", "no such image"),
+        Answer::error(413, "invalid_image", "no such image"),
         Answer::message(&refused, "stop"),
         Answer::text("a \u{0}\u{1b}\n\"tab\t日本"),
         Answer::message_charged("C", 5_000_000_000),
@@ -217,7 +217,8 @@ fn record_table_keeps_odd_texts() {
     ));
     insta::assert_snapshot!(call.messages(), @"
     exit code: 1
-     WARN m: a trial about a.png failed: http://127.0.0.1:[PORT]/v1 answered 400: no such image
+     WARN m: a trial about a.png failed: http://127.0.0.1:[PORT]/v1 answered 413: no such image (send smaller images:
+        --image max-side=N, or --image jpeg:95)
      WARN run/records.parquet: numbers that are too large for the column prompt_tokens, and are null in it: 1;
         records.jsonl has them
     ");
@@ -239,7 +240,7 @@ fn record_table_keeps_odd_texts() {
         .filter(|row| row["outcome"] == "failed")
         .collect();
     assert_eq!(failed.len(), 1);
-    assert_eq!(failed[0]["failure_status"], 400);
+    assert_eq!(failed[0]["failure_status"], 413);
     for name in [
         "right",
         "right_lenient",

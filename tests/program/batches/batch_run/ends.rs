@@ -26,7 +26,7 @@ fn batch_output_key_is_never_stored() {
     const KEY: &str = "sk-0123456789abcdef";
     let course = Course::of("completed")
         .text("C, and the key is sk-0123456789abcdef")
-        .lines(|i| [Line::Right, Line::Status(400, "no sk-0123456789abcdef")][i % 2]);
+        .lines(|i| [Line::Right, Line::Status(413, "no sk-0123456789abcdef")][i % 2]);
     let bench = Bench::with_questions(QUESTIONS);
     let mock = MockBatches::start([course]);
     let base = mock.base_url();
@@ -80,7 +80,7 @@ fn server_faults_are_asked_again() {
 #[test]
 fn refused_requests_are_not_repeated() {
     let course =
-        Course::of("completed").lines(|i| [Line::Right, Line::Status(400, "bad image")][i % 2]);
+        Course::of("completed").lines(|i| [Line::Right, Line::Status(413, "bad image")][i % 2]);
     let (bench, mock, called) = blind(&[course, Course::of("completed")], "");
     assert_eq!(called.code, Some(1), "{called:?}");
     assert_eq!(

@@ -141,6 +141,55 @@ fn refused_field_costs_one_batch() {
     });
 }
 
+/// The same early end under a known word, an unknown one and two statuses: unread, and in two batches at most.
+#[test]
+fn early_ends_are_unread_in_batches() {
+    fn known(i: usize) -> Line {
+        [Line::Right, Line::Ended("content_filter")][i % 2]
+    }
+    fn unknown(i: usize) -> Line {
+        [Line::Right, Line::Ended("NO_IMAGE")][i % 2]
+    }
+    fn moderated(i: usize) -> Line {
+        [
+            Line::Right,
+            Line::Status(403, "Content violates usage guidelines."),
+        ][i % 2]
+    }
+    fn refused(i: usize) -> Line {
+        [Line::Right, Line::Status(400, "an odd refusal")][i % 2]
+    }
+    let rows: [(fn(usize) -> Line, fn(usize) -> Line, usize); 4] = [
+        (known, known, 1),
+        (unknown, |_| Line::Ended("NO_IMAGE"), 2),
+        (moderated, moderated, 1),
+        (refused, |_| Line::Status(400, "an odd refusal"), 2),
+    ];
+    for (first, second, batches) in rows {
+        let courses = [first, second].map(|lines| Course::of("completed").lines(lines));
+        let (bench, mock, called) = blind(&courses, "");
+        assert_eq!(called.code, Some(0), "{called:?}");
+        let answered = answered(&bench);
+        let right = answered.iter().filter(|one| one["outcome"] == "right");
+        assert_eq!((answered.len(), right.count()), (QUESTIONS, QUESTIONS / 2));
+        assert_eq!(mock.asked().len(), batches, "{called:?}");
+    }
+}
+
+/// What the second batch answers was broken off.
+#[test]
+fn broken_generation_is_answered_by_the_next_batch() {
+    let courses = [
+        Course::of("completed").lines(|i| [Line::Right, Line::Ended("zeitgeist")][i % 2]),
+        Course::of("completed"),
+    ];
+    let (bench, mock, called) = blind(&courses, "");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    let answered = answered(&bench);
+    assert!(answered.iter().all(|record| record["outcome"] == "right"));
+    assert_eq!((answered.len(), mock.asked().len()), (QUESTIONS, 2));
+}
+
 #[test]
 fn answers_and_marks_use_batches() {
     let house = House::new();

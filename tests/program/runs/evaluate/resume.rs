@@ -97,7 +97,7 @@ fn only_torn_record_is_repeated() {
 #[test]
 fn failed_trials_are_counted_and_repeated() {
     let bench = Bench::with_frames();
-    let broken = Answer::error(400, "bad_image", "cannot look at this");
+    let broken = Answer::error(413, "bad_image", "cannot look at this");
     let endpoint = MockEndpoint::start([Answer::text("B"), broken, Answer::text("A")]);
     let url = endpoint.base_url();
     let args = model_args(&url, "--data frames --levels L0 --concurrency 1 --out run");
@@ -114,7 +114,7 @@ fn failed_trials_are_counted_and_repeated() {
         .unwrap();
     assert_eq!(
         (&failed["failure"]["status"], &failed["strict"]),
-        (&json!(400), &Value::Null)
+        (&json!(413), &Value::Null)
     );
     bench.complete(&args);
     assert_eq!(

@@ -16,7 +16,7 @@ pub enum Finish {
     Length,
     /// A content filter stopped the reply.
     Filter,
-    /// Another reason, in the server's words.
+    /// Another reason, in the server's words: of a complete reply if [`Finish::is_whole`], else of one that the server ended early.
     Other(String),
     /// Not reported by the server.
     Unknown,
@@ -25,6 +25,26 @@ pub enum Finish {
 impl Finish {
     /// Maximum length of a reason in a server's words, in characters; chosen.
     const MAX_REASON_CHARS: usize = 40;
+
+    /// Words of replies that are complete and end in a way of their own: calls of tools (OpenAI, Anthropic), guesses of built-in models.
+    const WHOLE: [&str; 4] = ["tool_calls", "function_call", "tool_use", "guess"];
+
+    /// True if the reply is complete, so that an answer is looked for in a sentence, too. Of a reply that a filter, a limit or the server
+    /// ended early, only a text that is an answer and nothing else counts.
+    #[must_use]
+    pub fn is_whole(&self) -> bool {
+        match self {
+            Self::Stop | Self::Unknown => true,
+            Self::Length | Self::Filter => false,
+            Self::Other(word) => Self::WHOLE.contains(&&*Self::normalized(word)),
+        }
+    }
+
+    /// A server's word in lower case, with underscores.
+    #[must_use]
+    pub fn normalized(word: &str) -> String {
+        word.trim().to_ascii_lowercase().replace(['-', ' '], "_")
+    }
 
     /// Shortens a reason in the server's words and removes its control characters.
     #[must_use]
@@ -215,6 +235,9 @@ pub struct Reply {
     pub observed: Option<Observed>,
     /// The likeliest tokens; `None` if they were not requested or the server stated none.
     pub chances: Option<TokenChances>,
+    /// True if another try may end in another way: the server's word for the end is not known, or the model thought and gave no answer.
+    /// Not stored.
+    pub may_heal: bool,
 }
 
 impl Reply {
@@ -234,6 +257,7 @@ impl Reply {
             lost: LostAttempts::default(),
             observed: None,
             chances: None,
+            may_heal: false,
         }
     }
 }

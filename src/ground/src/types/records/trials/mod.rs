@@ -95,16 +95,13 @@ impl<D: StoredDetail> Trials<D> {
             condition: record.condition,
         });
         let failure = record.failure.map(|failure| (failure.kind, failure.status));
-        let broken_off = match record.finish {
-            Some(Finish::Other(word)) if failure.is_some() => Some(word),
-            _ => None,
-        };
+        let ended_by = ended_by(record.finish, record.refusal.as_deref(), failure.is_some());
         let ending = self.endings.intern(Ending {
             served_model: record.served_model,
             provider: record.provider,
             via: record.via,
             failure,
-            broken_off,
+            ended_by,
             attempts: record.attempts,
             lost: record.lost,
             max_tokens: record.max_tokens,
@@ -465,4 +462,22 @@ impl<D: StoredDetail> FromIterator<Record<D>> for Trials<D> {
         }
         trials
     }
+}
+/// The word for a reply that the server ended early, or for a generation that broke off; `None` for others.
+fn ended_by(finish: Option<Finish>, refusal: Option<&str>, has_failed: bool) -> Option<String> {
+    match finish.filter(|finish| !finish.is_whole())? {
+        Finish::Other(word) => Some(word),
+        _ if has_failed => None,
+        Finish::Length => Some("length".to_owned()),
+        _ => Some(refusal.and_then(refused_status).map_or_else(
+            || "content_filter".to_owned(),
+            |status| format!("status {status}"),
+        )),
+    }
+}
+
+/// The HTTP status at the start of the refusal of a reply that was refused by a status.
+fn refused_status(refusal: &str) -> Option<&str> {
+    let (status, _) = refusal.split_once(": ")?;
+    (status.len() == 3 && status.bytes().all(|byte| byte.is_ascii_digit())).then_some(status)
 }

@@ -132,7 +132,14 @@ impl<'t, D: StoredDetail> TrialRef<'t, D> {
     /// The server's word for the reason why the last attempt broke off; `None` for other failures and for replies.
     #[must_use]
     pub fn broken_off(self) -> Option<&'t str> {
-        self.ending().broken_off.as_deref()
+        self.ending().ended_by.as_deref().filter(|_| self.failed())
+    }
+
+    /// The word for a reply that the server ended early: its finish reason, or the status by which it refused the content; `None` for
+    /// whole replies and for failures.
+    #[must_use]
+    pub fn ended_early(self) -> Option<&'t str> {
+        self.ending().ended_by.as_deref().filter(|_| !self.failed())
     }
 
     /// Whether a reply or a refusal came.
