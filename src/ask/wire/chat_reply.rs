@@ -5,6 +5,7 @@ use serde_json::Value;
 use super::finish_reason;
 use super::json_body;
 use super::logprobs;
+use super::other_field;
 use super::stream;
 use super::usage;
 use crate::ask::failures::{ApiError, ReplyError, Unreadable, Wording};
@@ -49,7 +50,11 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, ReplyError>
         .filter(|text| !text.is_empty())
         .map(str::to_owned)
         .or(refusal_part);
-    let is_empty = text.is_empty() && refusal.is_none() && !logprobs::has_reasoning(message);
+    let (text, other_field) = match refusal {
+        None if text.trim().is_empty() => other_field::of_message(text, message),
+        _ => (text, None),
+    };
+    let is_empty = text.is_empty() && refusal.is_none() && other_field.is_none();
     if is_empty && is_lost(&finish, usage) {
         return Err(unreadable(LOST).into());
     }
@@ -61,6 +66,7 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, ReplyError>
         provider: json_body::string_field(&completion, "provider"),
         attempts: 0,
         chances,
+        other_field,
         ..Reply::local(text)
     })
 }
@@ -172,6 +178,50 @@ mod tests {
             ("", Some("no"))
         );
         assert!(json(r#"{"choices":[{"message":{"content":{"a":1}}}]}"#).is_err());
+    }
+
+    #[test]
+    fn answers_in_other_fields_are_found() {
+        let call = |arguments: &str| {
+            let call = serde_json::json!({"id": "c", "type": "function", "function": {"name": "reply", "arguments": arguments}});
+            message(&serde_json::json!({"content": null, "tool_calls": [call]}).to_string())
+        };
+        let reply = call(r#"{"answer": "B", "why": "a bed"}"#);
+        assert_eq!(reply.text, "B");
+        assert_eq!(
+            reply.other_field.unwrap().name,
+            "tool_calls (answer, reply)"
+        );
+        assert_eq!(call(r#"{"mark": 4}"#).text, "4");
+        for arguments in [
+            r#"{"query": "kitchen"}"#,
+            r#"{"answer": "A", "choice": "B"}"#,
+            "not JSON",
+        ] {
+            let reply = call(arguments);
+            assert_eq!(reply.text, "", "{arguments}");
+            assert_eq!(reply.other_field.unwrap().text, arguments);
+        }
+        for (field, value) in [
+            ("reasoning_content", r#""A""#),
+            ("reasoning", r#""A""#),
+            ("thoughts_of_zork", r#""A""#),
+            (
+                "reasoning_details",
+                r#"[{"type": "reasoning.text", "text": "A"}]"#,
+            ),
+        ] {
+            let reply = message(&format!(r#"{{"content":null,"{field}":{value}}}"#));
+            let found = reply.other_field.unwrap();
+            assert_eq!((&*found.name, &*found.text), (field, "A"));
+            assert_eq!(reply.text, "", "the thoughts are no text");
+            let beside = message(&format!(r#"{{"content":"B","{field}":{value}}}"#));
+            assert_eq!((beside.text.as_str(), beside.other_field), ("B", None));
+        }
+        assert_eq!(
+            message(r#"{"role":"assistant","content":""}"#).other_field,
+            None
+        );
     }
 
     #[test]

@@ -4,6 +4,7 @@ mod ask;
 mod faults;
 mod money;
 mod money_simulation;
+mod other_fields;
 mod own_requests;
 mod pauses;
 mod replicas;

@@ -183,6 +183,17 @@ pub struct Reply {
     pub observed: Option<Observed>,
     /// The likeliest tokens; `None` if they were not requested or the server stated none.
     pub chances: Option<TokenChances>,
+    /// The field with the only text of a reply without content; `None` for every other reply.
+    pub other_field: Option<OtherField>,
+}
+
+/// A field of a response, other than that of the content, with its text.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct OtherField {
+    /// The field: `reasoning_content`, the arguments of a tool call.
+    pub name: String,
+    /// The text.
+    pub text: String,
 }
 
 impl Reply {
@@ -202,6 +213,7 @@ impl Reply {
             lost: LostAttempts::default(),
             observed: None,
             chances: None,
+            other_field: None,
         }
     }
 }
