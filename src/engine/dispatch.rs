@@ -20,9 +20,9 @@ use crate::engine::first_failures::FirstFailures;
 use crate::engine::interrupt::Interrupt;
 use crate::engine::lanes::{Lanes, PreparedTrial};
 use crate::engine::models::ModelUnderTest;
+use crate::engine::reply_checks::ReplyChecks;
 use crate::engine::settings::JobSettings;
 use crate::engine::suspects::Suspects;
-use crate::engine::truncation::TruncationCheck;
 use crate::error::{Error, Result};
 use crate::images::image_pipeline::EnhancerStopper;
 use crate::images::notes::ImageNotes;
@@ -45,8 +45,8 @@ pub(crate) struct Dispatcher<'a> {
     pub(crate) settings: &'a JobSettings,
     pub(crate) timings: &'a Timings,
     pub(crate) in_flight_cost: InFlightCost,
-    /// The flag of the token limit of these models.
-    pub(crate) token_flag: &'static str,
+    /// The checks of the replies, which begin anew.
+    pub(crate) replies: ReplyChecks,
 }
 
 /// Numbers of trials in one phase.
@@ -87,7 +87,7 @@ impl Dispatcher<'_> {
             budget,
             stoppers,
             answered: counts.answered,
-            truncation: TruncationCheck::new(self.token_flag),
+            checks: self.replies.clone(),
             measured: MeasuredTokens::new(self.models.len()),
             dependence: vec![ImageDependence::default(); self.models.len()],
             is_estimate_compared: vec![false; self.models.len()],
@@ -137,7 +137,7 @@ struct ReplySink<'a, I: Item> {
     stoppers: Vec<EnhancerStopper>,
     /// Number of trials with a reply, including those of earlier calls.
     answered: usize,
-    truncation: TruncationCheck,
+    checks: ReplyChecks,
     /// Tokens charged for the images of the replies.
     measured: MeasuredTokens,
     /// Check of each model that its replies depend on the image.
@@ -513,7 +513,7 @@ impl<I: Item> ReplySink<'_, I> {
         }
         if let Ok(reply) = &result {
             self.answered += 1;
-            self.truncation.count(reply);
+            self.checks.count(reply);
             self.compare_with_estimate(&ready, reply);
             if let Some(usage) = reply.usage {
                 let model = &self.dispatcher.models[trial.model];

@@ -22,10 +22,11 @@ pub(crate) mod models;
 pub(crate) mod observer;
 pub(crate) mod open_files;
 pub(crate) mod open_run;
+pub(crate) mod reply_checks;
 pub(crate) mod room_net;
 pub(crate) mod settings;
 pub(crate) mod suspects;
-pub(crate) mod truncation;
+mod truncation;
 
 pub(crate) use job::Job;
 pub(crate) use open_run::{image_limit, pipeline};
