@@ -19,11 +19,11 @@ use crate::engine::interrupt::Interrupt;
 use crate::engine::lanes::{Lanes, PreparedTrial};
 use crate::engine::models::ModelUnderTest;
 use crate::engine::refusals::Refusals;
+use crate::engine::reply_checks::ReplyChecks;
 use crate::engine::sending::{Finished, send};
 use crate::engine::served_names::ServedNames;
 use crate::engine::settings::JobSettings;
 use crate::engine::suspects::Suspects;
-use crate::engine::truncation::TruncationCheck;
 use crate::error::{Error, Result};
 use crate::images::image_pipeline::EnhancerStopper;
 use crate::images::notes::ImageNotes;
@@ -48,8 +48,8 @@ pub(crate) struct Dispatcher<'a> {
     /// Trials that a gateway gave up on in an earlier call.
     pub(crate) timed_out: HashSet<TrialKey>,
     pub(crate) in_flight_cost: InFlightCost,
-    /// The flag of the token limit of these models.
-    pub(crate) token_flag: &'static str,
+    /// The checks of the replies, which begin anew.
+    pub(crate) replies: ReplyChecks,
 }
 
 /// Numbers of trials in one phase.
@@ -88,7 +88,7 @@ impl Dispatcher<'_> {
             budget,
             stoppers,
             answered: counts.answered,
-            truncation: TruncationCheck::new(self.token_flag),
+            checks: self.replies.clone(),
             tokens: TokenCheck::new(self.models.len()),
             dependence: vec![ImageDependence::default(); self.models.len()],
             first_questions: vec![FirstQuestion::NotAsked; self.models.len()],
@@ -140,7 +140,7 @@ struct ReplySink<'a, I: Item> {
     stoppers: Vec<EnhancerStopper>,
     /// Number of trials with a reply, including those of earlier calls.
     answered: usize,
-    truncation: TruncationCheck,
+    checks: ReplyChecks,
     /// Comparison of the charged tokens with the estimated ones.
     tokens: TokenCheck,
     /// Check of each model that its replies depend on the image.
@@ -526,7 +526,7 @@ impl<I: Item> ReplySink<'_, I> {
         }
         if let Ok(reply) = &result {
             self.answered += 1;
-            self.truncation.count(reply);
+            self.checks.count(reply);
             self.served[trial.model].add(&self.dispatcher.models[trial.model], reply);
             if let Some(usage) = reply.usage {
                 let model = &self.dispatcher.models[trial.model];

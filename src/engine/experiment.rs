@@ -14,6 +14,7 @@ use crate::runs::stored::StoredRun;
 use crate::store::Store;
 use crate::types::manifests::{Columns, Identity, PartPlace};
 use crate::types::{Record, RunQuestion};
+use darkqa_score::choice::llm_match::Protocol;
 
 /// Record type of an experiment's trials.
 pub(crate) type RecordOf<E> = Record<DetailOf<E>>;
@@ -59,6 +60,11 @@ pub(crate) trait Experiment: Sync {
     /// The command-line flag that limits the reply tokens in a phase.
     fn token_flag(&self, _phase: usize) -> &'static str {
         "--max-tokens"
+    }
+
+    /// The protocol by which the replies of a phase are read as marks; `None` for answers.
+    fn mark_protocol(&self, _phase: usize) -> Option<Protocol> {
+        None
     }
 
     /// Image sources (frames or walks) of this run or shard.

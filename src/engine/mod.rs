@@ -24,12 +24,13 @@ pub(crate) mod observer;
 pub(crate) mod open_files;
 pub(crate) mod open_run;
 mod refusals;
+pub(crate) mod reply_checks;
 pub(crate) mod room_net;
 mod sending;
 mod served_names;
 pub(crate) mod settings;
 pub(crate) mod suspects;
-pub(crate) mod truncation;
+mod truncation;
 
 pub(crate) use job::Job;
 pub(crate) use open_run::{image_limit, pipeline};

@@ -14,6 +14,7 @@ use crate::engine::dispatch::{Dispatcher, TrialCounts};
 use crate::engine::experiment::{DetailOf, Experiment};
 use crate::engine::manifest;
 use crate::engine::models::{self, ModelUnderTest};
+use crate::engine::reply_checks::ReplyChecks;
 use crate::engine::settings::JobSettings;
 use crate::error::Result;
 use crate::image_store::ImageStore;
@@ -347,7 +348,10 @@ impl<E: Experiment> OpenRun<'_, E> {
             timings: &timings,
             timed_out,
             in_flight_cost,
-            token_flag: experiment.token_flag(phase),
+            replies: ReplyChecks::new(
+                experiment.token_flag(phase),
+                experiment.mark_protocol(phase),
+            ),
         };
         let missing = missing_notes(experiment, self.store.folder());
         let started = Instant::now();

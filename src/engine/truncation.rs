@@ -1,15 +1,16 @@
 //! Warnings about replies that are cut at the token limit: [`TruncationCheck`].
 
 use crate::types::{Finish, Reply};
+use darkqa_score::choice::open_answer;
 
 /// Counts the replies that were cut at the token limit, and warns if their share shows that the limit is too low.
-#[derive(Debug)]
-pub(crate) struct TruncationCheck {
+#[derive(Debug, Clone)]
+pub(super) struct TruncationCheck {
     /// The flag that sets the limit.
     flag: &'static str,
     replies: usize,
     cut: usize,
-    /// Number of replies that were cut before any text.
+    /// Number of replies that were cut before any text, or in thoughts within the text.
     empty: usize,
     has_warned: bool,
 }
@@ -22,7 +23,7 @@ impl TruncationCheck {
     const MIN_REPLIES: usize = 20;
 
     /// A check without replies, for models whose token limit this flag sets.
-    pub(crate) fn new(flag: &'static str) -> Self {
+    pub(super) fn new(flag: &'static str) -> Self {
         Self {
             flag,
             replies: 0,
@@ -34,11 +35,11 @@ impl TruncationCheck {
 
     /// Counts a reply. Warns once: if more than half of the first [`Self::FIRST`] replies have no text, or later if a quarter of all
     /// replies were cut.
-    pub(crate) fn count(&mut self, reply: &Reply) {
+    pub(super) fn count(&mut self, reply: &Reply) {
         self.replies += 1;
         if reply.finish == Finish::Length {
             self.cut += 1;
-            self.empty += usize::from(reply.text.trim().is_empty());
+            self.empty += usize::from(open_answer(&reply.text).is_err());
         }
         if self.has_warned {
             return;
@@ -46,7 +47,7 @@ impl TruncationCheck {
         if self.replies == Self::FIRST && self.empty > Self::FIRST / 2 {
             self.has_warned = true;
             tracing::warn!(
-                "{} of the first {} replies were cut at the token limit before any text: a reasoning model needs a larger \
+                "{} of the first {} replies were cut at the token limit with no answer: a reasoning model needs a larger \
                  {}, or a lower --reasoning-effort",
                 self.empty,
                 self.replies,
@@ -62,6 +63,11 @@ impl TruncationCheck {
                 self.flag
             );
         }
+    }
+
+    /// Ends the warnings, if another one names the same cause.
+    pub(super) fn silence(&mut self) {
+        self.has_warned = true;
     }
 
     /// True if there are at least [`Self::MIN_REPLIES`] replies, and a quarter of them were cut.

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use super::alerts::{joining_alerts, open_early_ends, run_alerts};
+use super::alerts::{empty_answer_alerts, joining_alerts, open_early_ends, run_alerts};
 use super::combine::command_path;
 use super::enhancers;
 use super::join::join;
@@ -272,6 +272,7 @@ pub(super) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<JoinedRuns> {
     {
         record.model = joined.model_names.original_name(&record.model).to_owned();
     }
+    alerts.extend(empty_answer_alerts(&records));
     let run = OpenRun {
         records,
         others: runs

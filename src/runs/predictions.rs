@@ -6,6 +6,7 @@ use std::sync::Arc;
 use crate::ask::prompts::openeqa::blind_answer;
 use crate::types::{OpenDetail, QuestionId, Record, Step, Via, View};
 use darkqa_score::choice::llm_match::{Protocol, truncate_answer};
+use darkqa_score::choice::open_answer;
 use darkqa_score::model_in_condition::ModelInCondition;
 
 /// The state of one answer.
@@ -101,15 +102,16 @@ fn state(record: Option<&Record<OpenDetail>>, protocol: Protocol) -> (Option<Str
     (Some(full), state)
 }
 
-/// The answer in a model's reply; `None` if there is none, which upstream treats as an error. A missing, empty or refused reply has no
-/// answer.
+/// The answer in a model's reply, without thoughts and template tokens; `None` if there is none, which upstream treats as an error. A
+/// missing, empty or refused reply has no answer, and neither have thoughts that do not end.
 fn full_answer(record: &Record<OpenDetail>, protocol: Protocol) -> Option<String> {
     let reply = record
         .reply
         .as_deref()
-        .filter(|reply| record.refusal.is_none() && !reply.trim().is_empty())?;
-    match (record.view, blind_answer(reply), protocol) {
-        (View::Image, _, _) => Some(reply.to_owned()),
+        .filter(|_| record.refusal.is_none())?;
+    let reply = open_answer(reply).ok()?;
+    match (record.view, blind_answer(&reply), protocol) {
+        (View::Image, _, _) => Some(reply.into_owned()),
         (View::Blind, Some(answer), _) => Some(answer),
         (View::Blind, None, Protocol::Upstream) => None,
         (View::Blind, None, Protocol::Tolerant) => Some(reply.trim().to_owned()),

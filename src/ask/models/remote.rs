@@ -21,7 +21,8 @@ use crate::ask::requests::{
 use crate::ask::vendors::Vendor;
 use crate::ask::wire_kind::Wire;
 use crate::error::{Error, Result};
-use crate::types::{FailureKind, LostAttempts, Reply};
+use crate::types::questions::letter;
+use crate::types::{FailureKind, Finish, LostAttempts, Reply};
 
 /// A model of an endpoint with one set of parameters.
 #[derive(Debug)]
@@ -46,6 +47,8 @@ pub struct Remote {
     finish_words: FinishWords,
     /// True after the warning about a reply that does not follow the constraint.
     warned_unconstrained: AtomicBool,
+    /// True after the warning about a reply without content.
+    warned_other_field: AtomicBool,
 }
 
 /// Number of refusals by a status that concerns all questions after which the model is not asked any further, if it has answered none.
@@ -88,6 +91,7 @@ impl Remote {
             finish_words: FinishWords::default(),
             streams: StreamFallback::default(),
             warned_unconstrained: AtomicBool::new(false),
+            warned_other_field: AtomicBool::new(false),
         })
     }
 
@@ -306,6 +310,7 @@ impl Remote {
                             self.keep_streams(fields);
                         }
                     }
+                    let reply = self.with_other_field(reply, choices);
                     return Ok(Reply {
                         text: self.letter_or_text(reply.text, choices),
                         attempts: attempts + reply.attempts,
@@ -463,6 +468,42 @@ impl Remote {
         AskError::refused(status, &api_error, wire, sent)
     }
 
+    /// The reply with the text of another field, if its content is empty and the text of that field is an answer. Warns about the first
+    /// reply whose content is empty.
+    fn with_other_field(&self, mut reply: Reply, choices: usize) -> Reply {
+        let Some(field) = reply.other_field.take() else {
+            return reply;
+        };
+        if reply.text.trim().is_empty() && !self.parameters.asks_to_think() {
+            let constrain = self.parameters.constrain;
+            let answer = constrained_letter(constrain, choices, &field.text);
+            let text = answer.as_deref().unwrap_or(&field.text);
+            if is_bare_answer(text, choices) {
+                text.clone_into(&mut reply.text);
+                // Not an end with thoughts alone.
+                reply.may_heal &= !matches!(reply.finish, Finish::Stop | Finish::Unknown);
+            }
+        }
+        let is_read = !reply.text.trim().is_empty();
+        let is_cut = reply.finish == Finish::Length;
+        if (is_read || !is_cut) && !self.warned_other_field.swap(true, Ordering::Relaxed) {
+            let (name, field) = (self.name(), &field.name);
+            if is_read {
+                warn!(
+                    "{name}: answers come in the field {field:?}, with an empty content, and are read there; the server may take them for \
+                     thoughts (start it without a reasoning parser) or for tool calls"
+                );
+            } else {
+                warn!(
+                    "{name}: a reply has an empty content, and its text is in the field {field:?}, which is not read as an answer: either \
+                     the model ended with its thoughts, or the server's reasoning parser takes the answer for thoughts, as it does if \
+                     thinking is off; then start the server without its reasoning parser, or ask with thinking on"
+                );
+            }
+        }
+        reply
+    }
+
     /// Letter in a constrained reply, otherwise the whole text. Warns once if the server does not follow the constraint.
     fn letter_or_text(&self, text: String, choices: usize) -> String {
         let constrain = self.parameters.constrain;
@@ -480,6 +521,18 @@ impl Remote {
             text
         })
     }
+}
+
+/// True for a text that is an answer and nothing else, so that it cannot be thoughts: the letter of a choice, or a number if there are no
+/// choices.
+fn is_bare_answer(text: &str, choices: usize) -> bool {
+    let text = text.trim();
+    let bare = text.strip_prefix('(').unwrap_or(text);
+    let bare = bare.trim_end_matches([')', '.', ':']);
+    if choices == 0 {
+        return !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
+    }
+    (0..choices).any(|index| bare.eq_ignore_ascii_case(&letter(index).to_string()))
 }
 
 /// Checks that the fields of `--extra-body` do not set the same as a flag.

@@ -24,7 +24,7 @@ pub(in crate::ask) fn constrained_letter(
 ) -> Option<String> {
     let object: Option<Value> = match constrain {
         Constrain::None => return None,
-        Constrain::Json => serde_json::from_str(reply).ok(),
+        Constrain::Json => serde_json::from_str(without_fence(reply)).ok(),
         Constrain::Choice => None,
     };
     let text = match &object {
@@ -37,6 +37,20 @@ pub(in crate::ask) fn constrained_letter(
         .find(|letter| letter == text.trim())
 }
 
+/// The content of a fenced code block that is the whole text; other texts are returned as they are.
+fn without_fence(text: &str) -> &str {
+    let fenced = || {
+        let inner = text.trim().strip_prefix("```")?.strip_suffix("```")?;
+        let (language, block) = inner.split_once('\n')?;
+        language
+            .trim()
+            .chars()
+            .all(char::is_alphanumeric)
+            .then_some(block)
+    };
+    fenced().unwrap_or(text)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -47,6 +61,9 @@ mod tests {
         for (constrain, reply, letter) in [
             (Json, "{\"answer\": \"B\"}", Some("B")),
             (Json, " {\n\"answer\" : \"A\" }\n", Some("A")),
+            (Json, "```json\n{\"answer\": \"B\"}\n```\n", Some("B")),
+            (Json, "```\n{\"answer\": \"A\"}```", Some("A")),
+            (Json, "```json\n{\"answer\": \"C\"}\n```", None),
             (Json, "{\"answer\":\"C\"}", None),
             (Json, "{\"answer\":\"B", None),
             (Json, "{\"answer\":\"B\",\"why\":\"x\"}", None),

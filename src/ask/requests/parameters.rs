@@ -83,6 +83,12 @@ pub struct Parameters {
 }
 
 impl Parameters {
+    /// True if the model was told to think.
+    pub(in crate::ask) fn asks_to_think(&self) -> bool {
+        let effort = self.reasoning_effort.as_deref();
+        self.thinking == Some(Thinking::On) || effort.is_some_and(|effort| effort != "none")
+    }
+
     /// Default token limit; chosen.
     pub const MAX_TOKENS: NonZeroU32 = NonZeroU32::new(1024).unwrap();
 

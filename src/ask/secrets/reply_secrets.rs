@@ -1,7 +1,7 @@
 //! Removal of keys from replies, and limits on the length of their texts: [`without_secrets`].
 
 use super::secret::Scrub;
-use crate::types::{Finish, Reply, TokenChances, TokenPosition};
+use crate::types::{Finish, OtherField, Reply, TokenChances, TokenPosition};
 
 /// Maximum length of the text of a recorded reply, in bytes; chosen: four times a reply of 4,096 tokens.
 const MAX_TEXT: usize = 64 << 10;
@@ -31,6 +31,10 @@ pub(in crate::ask) fn without_secrets(reply: Reply, scrub: &Scrub) -> Reply {
         }
         .shorten(),
         chances: reply.chances.map(|chances| map_tokens(chances, name)),
+        other_field: reply.other_field.map(|field| OtherField {
+            name: name(field.name),
+            text: shortened(scrub.reply(field.text)),
+        }),
         ..reply
     }
 }

@@ -5,6 +5,7 @@ use serde_json::Value;
 use super::finish_reason::{self, Ending};
 use super::json_body;
 use super::logprobs;
+use super::other_field;
 use super::stream;
 use super::usage;
 use crate::ask::failures::{ApiError, ReplyError, Unreadable, Wording};
@@ -50,14 +51,19 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, ReplyError>
         .filter(|text| !text.is_empty())
         .map(str::to_owned)
         .or(refusal_part);
+    let has_thought = text.trim().is_empty()
+        && refusal.is_none()
+        && logprobs::thought(message, completion.get("usage"), &text) == Thought::Before;
+    let (text, other_field) = match refusal {
+        None if text.trim().is_empty() => other_field::of_message(text, message),
+        _ => (text, None),
+    };
     let is_empty = text.trim().is_empty() && refusal.is_none();
-    let has_thought =
-        is_empty && logprobs::thought(message, completion.get("usage"), &text) == Thought::Before;
-    if is_empty && !has_thought && is_lost(&finish, usage) {
+    if is_empty && !has_thought && other_field.is_none() && is_lost(&finish, usage) {
         return Err(unreadable(LOST).into());
     }
     // The answer after the thoughts may have been lost, or the model gave none.
-    let may_heal = may_heal || (has_thought && is_end(&finish));
+    let may_heal = may_heal || (is_empty && has_thought && is_end(&finish));
     Ok(Reply {
         refusal,
         finish,
@@ -67,6 +73,7 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, ReplyError>
         attempts: 0,
         chances,
         may_heal,
+        other_field,
         ..Reply::local(text)
     })
 }
@@ -187,6 +194,50 @@ mod tests {
             ("", Some("no"))
         );
         assert!(json(r#"{"choices":[{"message":{"content":{"a":1}}}]}"#).is_err());
+    }
+
+    #[test]
+    fn answers_in_other_fields_are_found() {
+        let call = |arguments: &str| {
+            let call = serde_json::json!({"id": "c", "type": "function", "function": {"name": "reply", "arguments": arguments}});
+            message(&serde_json::json!({"content": null, "tool_calls": [call]}).to_string())
+        };
+        let reply = call(r#"{"answer": "B", "why": "a bed"}"#);
+        assert_eq!(reply.text, "B");
+        assert_eq!(
+            reply.other_field.unwrap().name,
+            "tool_calls (answer, reply)"
+        );
+        assert_eq!(call(r#"{"mark": 4}"#).text, "4");
+        for arguments in [
+            r#"{"query": "kitchen"}"#,
+            r#"{"answer": "A", "choice": "B"}"#,
+            "not JSON",
+        ] {
+            let reply = call(arguments);
+            assert_eq!(reply.text, "", "{arguments}");
+            assert_eq!(reply.other_field.unwrap().text, arguments);
+        }
+        for (field, value) in [
+            ("reasoning_content", r#""A""#),
+            ("reasoning", r#""A""#),
+            ("thoughts_of_zork", r#""A""#),
+            (
+                "reasoning_details",
+                r#"[{"type": "reasoning.text", "text": "A"}]"#,
+            ),
+        ] {
+            let reply = message(&format!(r#"{{"content":null,"{field}":{value}}}"#));
+            let found = reply.other_field.unwrap();
+            assert_eq!((&*found.name, &*found.text), (field, "A"));
+            assert_eq!(reply.text, "", "the thoughts are no text");
+            let beside = message(&format!(r#"{{"content":"B","{field}":{value}}}"#));
+            assert_eq!((beside.text.as_str(), beside.other_field), ("B", None));
+        }
+        assert_eq!(
+            message(r#"{"role":"assistant","content":""}"#).other_field,
+            None
+        );
     }
 
     #[test]

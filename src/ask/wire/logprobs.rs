@@ -149,7 +149,7 @@ pub(super) fn thought(message: &Value, usage: Option<&Value>, text: &str) -> Tho
 }
 
 /// True if a message has a non-empty reasoning field.
-pub(super) fn has_reasoning(message: &Value) -> bool {
+fn has_reasoning(message: &Value) -> bool {
     ["reasoning_content", "reasoning"]
         .iter()
         .any(|field| message.get(*field).is_some_and(is_filled))

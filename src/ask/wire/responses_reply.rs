@@ -6,15 +6,17 @@ use super::chat_reply::{is_end, words};
 use super::finish_reason::{self, Ending};
 use super::json_body;
 use super::logprobs;
+use super::other_field::{text_of, tool_call};
 use super::stream;
 use super::usage;
 use crate::ask::failures::{ApiError, ReplyError, Unreadable};
-use crate::types::{Finish, Reply, Thought, TokenChances, Usage};
+use crate::types::{Finish, OtherField, Reply, Thought, TokenChances, Usage};
 
 /// Parses a response body; `latency_ms` and `attempts` remain zero.
 ///
-/// The text is the text of all parts of type `output_text` in items of type `message`; reasoning items are ignored. A failed response has
-/// an error; an incomplete response has a reason, which becomes the finish reason.
+/// The text is the text of all parts of type `output_text` in items of type `message`; reasoning items are ignored, and so are messages of
+/// another phase than the final answer. A failed response has an error; an incomplete response has a reason, which becomes the finish
+/// reason.
 pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, ReplyError> {
     let text = json_body::text(body);
     let response = if stream::is_stream(&text, content_type) {
@@ -43,10 +45,16 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, ReplyError>
             .with_usage(usage)
             .into());
     }
-    let (text, refusal) = text_and_refusal(items);
-    let chances = chances(items, &response, &text);
+    let messages = answer_messages(items);
+    let (text, refusal) = text_and_refusal(&messages);
+    let chances = chances(&messages, items, &response, &text);
     let has_thought = has_summary(items)
         || logprobs::thought(&response, response.get("usage"), &text) == Thought::Before;
+    let (text, other_field) = if text.trim().is_empty() && refusal.is_empty() {
+        other_field(text, items)
+    } else {
+        (text, None)
+    };
     // The answer after the thoughts may have been lost, or the model gave none.
     let is_empty = text.trim().is_empty() && refusal.is_empty();
     let may_heal = may_heal || (is_empty && has_thought && is_end(&finish));
@@ -59,6 +67,7 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, ReplyError>
         attempts: 0,
         chances,
         may_heal,
+        other_field,
         ..Reply::local(text)
     })
 }
@@ -110,8 +119,13 @@ fn owned_text(value: Option<&Value>) -> Option<String> {
 }
 
 /// Token probabilities of the first text that has them, and whether the model thought before it; `None` without any.
-fn chances(items: &[Value], response: &Value, text: &str) -> Option<TokenChances> {
-    let positions = items
+fn chances(
+    messages: &[&Value],
+    items: &[Value],
+    response: &Value,
+    text: &str,
+) -> Option<TokenChances> {
+    let positions = messages
         .iter()
         .filter_map(|item| item.get("content")?.as_array())
         .flatten()
@@ -136,12 +150,65 @@ fn has_summary(items: &[Value]) -> bool {
         .any(|summary| !summary.is_empty())
 }
 
-/// Text of the messages in a response, and the text of the refusals in them.
-fn text_and_refusal(items: &[Value]) -> (String, String) {
-    let (mut text, mut refusal) = (String::new(), String::new());
-    let parts = items
+/// The messages with the answer: those of the final phase, or those without a phase.
+fn answer_messages(items: &[Value]) -> Vec<&Value> {
+    let messages = || items.iter().filter(|item| is_message(item));
+    let phase = |item: &Value| owned_text(item.get("phase"));
+    let of_phase = |is_wanted: fn(Option<String>) -> bool| {
+        messages()
+            .filter(move |item| is_wanted(phase(item)))
+            .collect::<Vec<&Value>>()
+    };
+    let finals = of_phase(|phase| {
+        phase.is_some_and(|phase| phase.contains("final") || phase.contains("answer"))
+    });
+    if finals.is_empty() {
+        of_phase(|phase| phase.is_none())
+    } else {
+        finals
+    }
+}
+
+fn is_message(item: &Value) -> bool {
+    item.get("type").is_none_or(|kind| kind == "message")
+}
+
+/// The text of a response without an answer, and the item that holds it. The answer in the only function call becomes the text; thoughts
+/// and messages of other phases do not.
+fn other_field(text: String, items: &[Value]) -> (String, Option<OtherField>) {
+    let calls: Vec<&Value> = items
         .iter()
-        .filter(|item| item.get("type").is_none_or(|kind| kind == "message"))
+        .filter(|item| item.get("type").is_some_and(|kind| kind == "function_call"))
+        .collect();
+    if let [call] = calls[..]
+        && let Some((answer, field)) = tool_call(call)
+    {
+        return (answer.unwrap_or(text), Some(field));
+    }
+    let field = items.iter().find_map(|item| {
+        let kind = item
+            .get("type")
+            .and_then(Value::as_str)
+            .unwrap_or("message");
+        let name = match owned_text(item.get("phase")) {
+            Some(phase) => format!("{kind}, phase {phase}"),
+            None => kind.to_owned(),
+        };
+        let text: String = ["content", "summary"]
+            .iter()
+            .filter_map(|field| item.get(*field))
+            .map(text_of)
+            .collect();
+        (!text.trim().is_empty()).then_some(OtherField { name, text })
+    });
+    (text, field)
+}
+
+/// Text of messages, and the text of the refusals in them.
+fn text_and_refusal(messages: &[&Value]) -> (String, String) {
+    let (mut text, mut refusal) = (String::new(), String::new());
+    let parts = messages
+        .iter()
         .filter_map(|item| item.get("content")?.as_array())
         .flatten();
     for part in parts {
@@ -190,6 +257,41 @@ mod tests {
         assert_eq!(
             (refused.text.as_str(), refused.refusal.as_deref()),
             ("", Some("I cannot"))
+        );
+    }
+
+    fn output(items: &serde_json::Value) -> Reply {
+        json(&serde_json::json!({"status": "completed", "output": items}).to_string()).unwrap()
+    }
+
+    #[test]
+    fn only_the_final_phase_becomes_the_text() {
+        use serde_json::json;
+        let message = |text: &str, phase: Option<&str>| json!({"type": "message", "phase": phase, "content": [{"type": "output_text", "text": text}]});
+        let commentary = message("It might be A.", Some("commentary"));
+        for last in [message("B", Some("final_answer")), message("B", None)] {
+            assert_eq!(output(&json!([commentary, last])).text, "B");
+        }
+        let all = json!([message("It is", None), message(" B", None)]);
+        assert_eq!(output(&all).text, "It is B");
+        let alone = output(&json!([commentary]));
+        assert_eq!(alone.text, "");
+        assert_eq!(alone.other_field.unwrap().name, "message, phase commentary");
+    }
+
+    #[test]
+    fn answers_in_other_items_are_found() {
+        use serde_json::json;
+        let call =
+            json!({"type": "function_call", "name": "reply", "arguments": "{\"answer\":\"B\"}"});
+        assert_eq!(output(&json!([call])).text, "B");
+        assert_eq!(output(&json!([call, call])).text, "", "two calls");
+        let thoughts =
+            json!({"type": "reasoning", "summary": [{"type": "summary_text", "text": "A"}]});
+        let reply = output(&json!([thoughts]));
+        assert_eq!(
+            (reply.text.as_str(), reply.other_field.unwrap().name),
+            ("", "reasoning".to_owned())
         );
     }
 

@@ -128,8 +128,10 @@ fn error_event(event: &Value) -> Option<Value> {
 struct JoinedChoice {
     finish_reason: Value,
     content: Vec<Value>,
-    /// The fields of [`TEXT_FIELDS`].
+    /// The other text fields, such as `refusal` and `reasoning_content`.
     texts: Map<String, Value>,
+    /// The functions of the tool calls.
+    calls: Vec<Value>,
     logprobs: Map<String, Value>,
 }
 
@@ -139,8 +141,11 @@ fn extend_bounded(joined: &mut Vec<Value>, more: &[Value]) {
     joined.extend(more.iter().take(room).cloned());
 }
 
-/// Text fields of a chunk besides its content.
-const TEXT_FIELDS: [&str; 3] = ["refusal", "reasoning_content", "reasoning"];
+/// Text fields of a chunk that are repeated whole, not continued.
+const WHOLE_FIELDS: [&str; 6] = ["role", "content", "id", "name", "type", "object"];
+
+/// Maximum number of text fields, and of tool calls, of a message; chosen.
+const MAX_FIELDS: usize = 64;
 
 impl JoinedChoice {
     /// Adds the next chunk of the choice.
@@ -155,11 +160,8 @@ impl JoinedChoice {
             Some(Value::Array(parts)) => extend_bounded(&mut self.content, parts),
             _ => {}
         }
-        for field in TEXT_FIELDS {
-            if let Some(text) = delta.and_then(|delta| delta.get(field)?.as_str()) {
-                let joined = self.texts.entry(field).or_insert_with(|| json!(""));
-                append(joined, text);
-            }
+        for (field, value) in delta.and_then(Value::as_object).into_iter().flatten() {
+            self.add_field(field, value);
         }
         // Each chunk has the tokens of its own text: join the lists.
         let logprobs = choice.get("logprobs").and_then(Value::as_object);
@@ -169,6 +171,44 @@ impl JoinedChoice {
                 if let Value::Array(joined) = joined {
                     extend_bounded(joined, more);
                 }
+            }
+        }
+    }
+
+    /// Adds a field of a chunk besides its content: a text, or the tool calls.
+    fn add_field(&mut self, field: &str, value: &Value) {
+        let has_room = self.texts.len() < MAX_FIELDS || self.texts.contains_key(field);
+        match value {
+            Value::String(text) if has_room && !WHOLE_FIELDS.contains(&field) => {
+                append(self.texts.entry(field).or_insert_with(|| json!("")), text);
+            }
+            Value::Array(calls) if field == "tool_calls" => {
+                for call in calls {
+                    self.add_call(call);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Adds a piece of a tool call, whose arguments come in several.
+    fn add_call(&mut self, piece: &Value) {
+        let last = self.calls.len().saturating_sub(1);
+        let index = piece.get("index").and_then(Value::as_u64);
+        let index = index.map_or(last, |index| usize::try_from(index).unwrap_or(MAX_FIELDS));
+        if index >= MAX_FIELDS {
+            return;
+        }
+        if self.calls.len() <= index {
+            let empty = json!({"function": {"name": "", "arguments": ""}});
+            self.calls.resize(index + 1, empty);
+        }
+        for field in ["name", "arguments"] {
+            if let Some(text) = piece
+                .pointer(&format!("/function/{field}"))
+                .and_then(Value::as_str)
+            {
+                append(&mut self.calls[index]["function"][field], text);
             }
         }
     }
@@ -199,6 +239,9 @@ impl JoinedChoice {
     /// The choice; its finish reason is null if no chunk had one.
     fn into_choice(self) -> Value {
         let mut message = self.texts;
+        if !self.calls.is_empty() {
+            message.insert("tool_calls".to_owned(), self.calls.into());
+        }
         match <[Value; 1]>::try_from(self.content) {
             Ok([text @ Value::String(_)]) => message.insert("content".to_owned(), text),
             Ok([part]) => message.insert("content".to_owned(), json!([part])),
@@ -236,6 +279,30 @@ mod tests {
             "choices": [{"index": 0, "message": {"content": "B.", "reasoning_content": "A"}, "finish_reason": "stop"}],
         });
         assert_eq!(assemble(stream), Ok(expected));
+    }
+
+    #[test]
+    fn tool_calls_and_other_texts_are_joined() {
+        let piece = |delta: Value| {
+            let choice = json!({"index": 0, "delta": delta, "finish_reason": null});
+            format!("data: {}\n\n", json!({"choices": [choice]}))
+        };
+        let call = |arguments: &str| json!({"tool_calls": [{"index": 0, "function": {"arguments": arguments}}]});
+        let named = json!({"role": "assistant", "tool_calls": [{"index": 0, "id": "c", "function": {"name": "reply", "arguments": ""}}]});
+        let pieces = [
+            piece(named),
+            piece(json!({"role": "assistant", "zork_text": "It is "})),
+            piece(json!({"zork_text": "dark"})),
+            piece(call("{\"answer\": ")),
+            piece(call("\"B\"}")),
+            "data: {\"choices\":[{\"index\":0,\"delta\":{},\"finish_reason\":\"tool_calls\"}]}\n\n"
+                .to_owned(),
+        ];
+        let function = json!({"name": "reply", "arguments": "{\"answer\": \"B\"}"});
+        assert_eq!(
+            assemble(&pieces.concat()).unwrap()["choices"][0]["message"],
+            json!({"zork_text": "It is dark", "tool_calls": [{"function": function}]})
+        );
     }
 
     #[test]

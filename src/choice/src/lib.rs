@@ -4,8 +4,8 @@
 //! [`ParsingMode::Lenient`] also finds an answer inside a reply; if two choices are possible, it accepts neither. No choice
 //! is ever guessed. If the strict parsing finds a choice, the lenient parsing finds the same.
 //!
-//! A reply passes through `clean` (which removes hidden reasoning, invisible characters and leaked tokens), then `strict`, then the
-//! levels of `lenient`.
+//! A reply passes through `reasoning` (which removes thoughts and leaked tokens of templates), then `strict`, then the levels of
+//! `lenient`. Answers to open questions ([`open_answer`]) and marks of judges ([`llm_match`]) pass through `reasoning`, too.
 
 #![allow(
     missing_docs,
@@ -34,12 +34,14 @@ use darkqa_ground::types::questions::{Answer, Choices, UnreadReason};
 use darkqa_ground::types::replies::{Finish, Reply};
 
 use rules::{lenient, strict};
-use text::clean;
+use text::reasoning::{Asked, separate_sections};
+
+pub use text::reasoning::{has_thoughts, open_answer};
 
 /// The version of the lenient parsing, raised whenever the result of any reply may change. `report --rescore` parses the replies of
-/// records of another version again. The strict parsing changed only with `lenient/4`: marks of reasoning, and full-width signs around
-/// letters.
-pub const LENIENT_VERSION: &str = "lenient/4";
+/// records of another version again. The strict parsing changed only with `lenient/4` (marks of reasoning, and full-width signs around
+/// letters) and `lenient/5` (marks of reasoning and tokens of templates by their form).
+pub const LENIENT_VERSION: &str = "lenient/5";
 
 /// The parsing of a reply: how much text may surround the answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
@@ -67,7 +69,7 @@ impl ParsingMode {
 
 /// The choice in a reply, as an index in the order shown, or the reason why none could be read.
 ///
-/// Text in a closed reasoning block, by the marks of `reasoning.toml`, is ignored. If a block is not closed, the result is
+/// Text in a closed reasoning block is ignored, whatever the names of its marks. If a block is not closed, the result is
 /// [`UnreadReason::Truncated`].
 ///
 /// ```
@@ -82,18 +84,19 @@ impl ParsingMode {
 /// ```
 #[must_use]
 pub fn read(reply: &str, choices: &Choices, mode: ParsingMode) -> Answer {
-    let text = match clean::without_reasoning(reply) {
-        Ok(text) => text,
+    let texts = choices.texts();
+    let is_choice = |text: &str| strict::read(text, texts).is_some();
+    let answer = match separate_sections(reply, Asked::Choice(&is_choice)) {
+        Ok(answer) => answer,
         Err(reason) => return Answer::Unparsed(reason),
     };
-    if let Some(answer) = strict::read(text, choices.texts()) {
+    if let Some(answer) = strict::read(answer.text, texts) {
         return answer;
     }
-    if let Some(rest) = clean::after_channel_name(text) {
-        let unread = Answer::Unparsed(UnreadReason::Truncated);
-        return strict::read(rest, choices.texts()).unwrap_or(unread);
+    if answer.is_open {
+        return Answer::Unparsed(UnreadReason::Truncated);
     }
-    match (mode, lenient::read(text, choices)) {
+    match (mode, lenient::read(answer.text, choices)) {
         (ParsingMode::Strict, Answer::Chosen(_)) => Answer::Unparsed(UnreadReason::NoChoice),
         (_, answer) => answer,
     }

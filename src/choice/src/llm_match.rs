@@ -1,7 +1,11 @@
 //! LLM-Match, OpenEQA's score of open answers by a judge model (Majumdar et al. 2024, CVPR, section 4): truncation of an answer,
 //! parsing of a mark, and points of a mark. It follows `facebookresearch/open-eqa` at cfa3fce.
 
+mod tolerant;
+
 use clap::ValueEnum;
+
+use super::text::reasoning::{Asked, separate};
 
 use darkqa_ground::types::flags::flag_words;
 
@@ -10,7 +14,7 @@ use darkqa_ground::types::flags::flag_words;
 pub enum Protocol {
     /// Text after the last full stop of an answer is cut off; marks are read exactly as by upstream's `parse_score`.
     Upstream,
-    /// Answers stay whole; a mark may also have spaces, a full stop, emphasis or "/5" around it.
+    /// Answers stay whole; a mark may also stand in JSON, in a box, after other words, or before an explanation.
     Tolerant,
 }
 
@@ -28,13 +32,21 @@ pub fn truncate_answer(answer: &str) -> &str {
     }
 }
 
-/// Parses the mark in a judge's reply; `None` without a mark. The upstream rules accept any integer, which [`points`] clips to 1 to 5.
-/// The tolerant protocol parses other replies as well, and there accepts only 1 to 5.
+/// Parses the mark in a judge's reply, without its thoughts; `None` without a mark. The upstream rules accept any integer, which
+/// [`points`] clips to 1 to 5. The tolerant protocol parses other replies as well, and there accepts only 1 to 5.
 #[must_use]
 pub fn mark(reply: &str, protocol: Protocol) -> Option<i64> {
-    upstream(reply).or_else(|| match protocol {
+    let has_mark = |text: &str| upstream(text).is_some();
+    let separated = separate(reply, Asked::Mark(&has_mark)).ok()?;
+    // Without thoughts, upstream sees the reply as it is.
+    let text = if separated.has_thoughts {
+        separated.text
+    } else {
+        reply
+    };
+    upstream(text).or_else(|| match protocol {
         Protocol::Upstream => None,
-        Protocol::Tolerant => tolerant(reply),
+        Protocol::Tolerant => tolerant::mark(text),
     })
 }
 
@@ -47,33 +59,6 @@ fn upstream(reply: &str) -> Option<i64> {
     let after_cue = &reply[reply.find(CUE)? + CUE.len()..];
     let line = after_cue.split('\n').next().unwrap_or(after_cue);
     line.trim().parse().ok()
-}
-
-/// The tolerant rules: one digit from 1 to 5, alone or after a cue word, with punctuation or emphasis around it.
-fn tolerant(reply: &str) -> Option<i64> {
-    let lower = reply.to_lowercase();
-    let after_cue = ["your mark", "mark", "score", "rating"]
-        .iter()
-        .find_map(|cue| Some(&lower[lower.rfind(cue)? + cue.len()..]))
-        .unwrap_or(&lower);
-    let digits = after_cue.trim_matches(is_decoration);
-    let digits = digits
-        .strip_prefix("is ")
-        .unwrap_or(digits)
-        .trim_matches(is_decoration);
-    let digits = digits
-        .strip_suffix("/5")
-        .or_else(|| digits.strip_suffix(" out of 5"))
-        .unwrap_or(digits)
-        .trim_matches(is_decoration);
-    match digits.as_bytes() {
-        [digit @ b'1'..=b'5'] => Some(i64::from(digit - b'0')),
-        _ => None,
-    }
-}
-
-fn is_decoration(c: char) -> bool {
-    c.is_whitespace() || "*_`:=\"'().[]".contains(c)
 }
 
 /// Points of one item, between 0 and 1: (clip(mark, 1, 5) − 1) / 4. A null answer (`None`) has 0 points without a judge.
@@ -120,6 +105,52 @@ mod tests {
             ("It is a good answer.", none, none),
             ("", none, none),
             ("0 or 6", none, none),
+            ("{\"mark\": 5}", none, five),
+            (
+                "```json\n{\"score\": \"5\", \"reason\": \"2 of 2 chairs\"}\n```",
+                none,
+                five,
+            ),
+            ("{\"reason\": \"it fits\", \"rating\": 5.0}", none, five),
+            ("{\"mark\": 7}", none, none),
+            ("{\"mark\": 4, \"score\": 5}", none, none),
+            ("\\boxed{5}", none, five),
+            ("[[5]]", none, five),
+            ("<score>5</score>", none, five),
+            ("Your mark: 5 (fits)", none, five),
+            ("Your mark: 5. It names 2 chairs.", none, five),
+            ("5 - the response fits", none, five),
+            ("5 (out of 5): 3 chairs", none, five),
+            ("The response fits.\n\n5", none, five),
+            ("Score (1-5): 5", none, five),
+            ("On a scale of 1 to 5, I would give it a 5.", none, five),
+            ("The response deserves 5 out of 5.", none, five),
+            ("Score: 5. A score of 4 would be too low.", none, five),
+            ("Score: 5/10", none, none),
+            ("Your mark: 4.5", none, none),
+            ("Your mark: 4-5", none, none),
+            ("Your mark: 4 or 5", none, none),
+            ("I would not give it a 5.", none, none),
+            ("The response names 5 chairs.", none, none),
+            ("Score: 55", none, none),
+        ] {
+            assert_eq!(mark(reply, Protocol::Upstream), upstream, "{reply:?}");
+            assert_eq!(mark(reply, Protocol::Tolerant), tolerant, "{reply:?}");
+        }
+        for (reply, upstream, tolerant) in [
+            (
+                "<think>\nYour mark: 1\nNo.</think>\nYour mark: 5",
+                five,
+                five,
+            ),
+            ("<think>Maybe 1.</think>\n\n5", five, five),
+            ("</think>5", five, five),
+            ("<ponder>Your mark: 1</ponder>Your mark: 5", five, five),
+            ("<think>Your mark: 1", none, none),
+            ("Your mark: 5<|im_end|>", none, five),
+            ("5<|zork|>", none, five),
+            ("<evaluation>Your mark: 5\n</evaluation>", five, five),
+            ("<evaluation>fits\nYour mark: 5", five, five),
         ] {
             assert_eq!(mark(reply, Protocol::Upstream), upstream, "{reply:?}");
             assert_eq!(mark(reply, Protocol::Tolerant), tolerant, "{reply:?}");

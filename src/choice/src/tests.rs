@@ -4,6 +4,7 @@
 
 mod by_rule;
 mod properties;
+mod reasoning;
 mod words;
 
 use proptest::prelude::*;
@@ -101,50 +102,6 @@ fn replies_of_the_table_are_parsed() {
         wrong.len(),
         wrong.join("\n")
     );
-}
-
-/// Text inside reasoning marks is ignored; text after them is parsed strictly.
-#[test]
-fn reasoning_blocks_are_ignored() {
-    let rooms = choices_of(&["kitchen", "bedroom", "bathroom"]);
-    for (begin, end) in [
-        ("<think>", "</think>"),
-        ("<|channel>thought\n", "<channel|>"),
-        ("[THINK]", "[/THINK]"),
-        ("◁think▷", "◁/think▷"),
-        ("<|START_THINKING|>", "<|END_THINKING|>"),
-        (
-            "<|channel|>analysis<|message|>",
-            "<|channel|>final<|message|>",
-        ),
-    ] {
-        let thought = "It could be A. The answer is C at first sight.\n";
-        for (reply, expected) in [
-            (format!("{begin}{thought}{end}B"), Answer::Chosen(1)),
-            (format!("{begin}{end}\n(B) bedroom"), Answer::Chosen(1)),
-            (format!("{thought}{end}B"), Answer::Chosen(1)),
-            (
-                format!("{begin}{thought}"),
-                Answer::Unparsed(UnreadReason::Truncated),
-            ),
-        ] {
-            for mode in ParsingMode::ALL {
-                assert_eq!(read(&reply, &rooms, mode), expected, "{reply:?}");
-            }
-        }
-    }
-}
-
-/// A server that drops special tokens leaves the name of Gemma's reasoning channel. The end of the reasoning is then unknown.
-#[test]
-fn reasoning_without_marks_is_not_parsed() {
-    let rooms = choices_of(&["kitchen", "bedroom", "bathroom"]);
-    let reply = "thought\nThe image is dark. The answer is C at first sight, hmm.\nB";
-    for mode in ParsingMode::ALL {
-        let unread = Answer::Unparsed(UnreadReason::Truncated);
-        assert_eq!(read(reply, &rooms, mode), unread);
-        assert_eq!(read("thought\n\nB", &rooms, mode), Answer::Chosen(1));
-    }
 }
 
 #[test]

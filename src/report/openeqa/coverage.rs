@@ -24,7 +24,7 @@ pub(in crate::report) fn coverage(report: &OpenReport<'_>) -> Vec<String> {
         ),
         (
             total(report, |cell| cell.null),
-            "without an answer (none in a file, or no \"A:\" in the reply of a blind model): scored 0, unjudged",
+            "without an answer (none in a file, only thoughts, no \"A:\" of a blind model): scored 0, unjudged",
         ),
         (
             total(report, |cell| cell.cut),

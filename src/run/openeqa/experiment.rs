@@ -26,6 +26,7 @@ use crate::runs::stored::StoredRun;
 use crate::store::Store;
 use crate::types::manifests::{Columns, Identity, JUDGES, PartPlace};
 use crate::types::{Family, FrameId, OpenDetail, Record, RunQuestion};
+use darkqa_score::choice::llm_match::Protocol;
 
 /// A typical answer, for estimating the length of a judge's prompt.
 const ANSWER: &str =
@@ -62,6 +63,10 @@ impl Experiment for OpenSetup<'_> {
             0 => "--max-tokens",
             _ => "--judge-max-tokens",
         }
+    }
+
+    fn mark_protocol(&self, phase: usize) -> Option<Protocol> {
+        (phase > 0).then_some(self.config.protocol)
     }
 
     fn sources(&self) -> &[Source] {

@@ -16,6 +16,8 @@ mod servers;
 mod settings;
 mod words;
 
+pub(super) use replies::empty_answer_alerts;
+
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::combine::Combined;
@@ -41,6 +43,7 @@ pub(super) fn alerts(combined: &Combined, findings: &Findings<'_>) -> Vec<Alert>
     alerts.extend(joining_alerts(combined));
     alerts.extend(replies::reply_alerts(&findings.health, "count as wrong"));
     alerts.extend(unread_early_ends(combined, "count as wrong"));
+    alerts.extend(replies::empty_choice_alerts(combined));
     alerts.extend(replies::broken_off_alert(combined));
     alerts.extend(replies::people_alerts(combined));
     alerts.extend(images::image_alerts(combined));
@@ -83,6 +86,7 @@ pub(super) fn alerts_without_truths(
     alerts.extend(joining_alerts(combined));
     alerts.extend(replies::reply_alerts(&agreement.health, "do not agree"));
     alerts.extend(unread_early_ends(combined, "do not agree"));
+    alerts.extend(replies::empty_choice_alerts(combined));
     alerts.extend(replies::broken_off_alert(combined));
     alerts.extend(parsing::parsing_alerts(combined));
     alerts.extend(constraints::constraint_alerts(

@@ -11,7 +11,9 @@ use crate::text::alert::{Alert, AlertKind, MAX_UNREAD};
 use crate::text::outcome_words::failure_reason;
 use crate::types::degradations::AxisLevel;
 use crate::types::text::counted;
-use crate::types::{Condition, FailureKind, StoredDetail, TrialRef, UnreadReason};
+use crate::types::{
+    Condition, FailureKind, Finish, OpenDetail, Record, StoredDetail, TrialRef, UnreadReason, Usage,
+};
 use darkqa_score::accuracies::Health;
 
 /// Alerts about replies that could not be parsed and about failed trials. `unread_as` completes the sentence about the former, for example
@@ -181,6 +183,63 @@ pub(super) fn broken_off_alert(combined: &Combined) -> Option<Alert> {
         words.join(", ")
     );
     (!words.is_empty()).then(|| Alert::new(AlertKind::Failed, text))
+}
+
+/// One alert for each model of a multiple-choice run with empty replies ([`empty_alerts`]).
+pub(super) fn empty_choice_alerts(combined: &Combined) -> Vec<Alert> {
+    empty_alerts(
+        combined
+            .trials
+            .iter()
+            .filter(|trial| !trial.failed())
+            .map(|trial| {
+                let why = trial.strict().and_then(|strict| strict.why);
+                let is_empty = why == Some(UnreadReason::Empty);
+                (trial.model(), is_empty && is_charged(trial.usage()))
+            }),
+    )
+}
+
+/// One alert for each model with empty answers to open questions ([`empty_alerts`]).
+pub(in crate::run_reports) fn empty_answer_alerts(records: &[Record<OpenDetail>]) -> Vec<Alert> {
+    empty_alerts(
+        records
+            .iter()
+            .filter(|record| !record.failed())
+            .filter_map(|record| {
+                let reply = record.reply.as_deref()?;
+                let is_whole = record.finish == Some(Finish::Stop) && record.refusal.is_none();
+                let is_empty = is_whole && reply.trim().is_empty();
+                Some((&*record.model, is_empty && is_charged(record.usage)))
+            }),
+    )
+}
+
+/// One alert for each model with more than [`MAX_UNREAD`] complete replies that are empty although the server charged tokens for them.
+/// `replies` has the model of each reply, and whether it is one of these.
+fn empty_alerts<'a>(replies: impl Iterator<Item = (&'a str, bool)>) -> Vec<Alert> {
+    let mut counts = BTreeMap::<&str, [usize; 2]>::new();
+    for (model, is_empty) in replies {
+        let [all, empty] = counts.entry(model).or_default();
+        *all += 1;
+        *empty += usize::from(is_empty);
+    }
+    counts
+        .into_iter()
+        .filter(|(_, [all, empty])| *empty as f64 > MAX_UNREAD * *all as f64)
+        .map(|(model, [all, empty])| {
+            let text = format!(
+                "{empty} of {all} replies of {model} are empty, although the server charged tokens for them: it may have sent the answers in \
+                 another field, as a reasoning parser does if the model does not think. Start the server without the parser, and repeat \
+                 the command with another --out."
+            );
+            Alert::new(AlertKind::Unread, text)
+        })
+        .collect()
+}
+
+fn is_charged(usage: Option<Usage>) -> bool {
+    usage.and_then(|usage| usage.completion_tokens) > Some(0)
 }
 
 /// One alert for each run with human answers that are not a choice of their question.

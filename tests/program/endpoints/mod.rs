@@ -6,6 +6,7 @@ mod faults;
 mod gateways;
 mod money;
 mod money_simulation;
+mod other_fields;
 mod own_requests;
 mod pauses;
 mod replicas;

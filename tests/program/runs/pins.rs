@@ -327,7 +327,7 @@ fn cut_report(cut: usize, output: &Value) -> String {
 fn truncating_limit_warns() {
     let output = cut_report(6, &Value::Null);
     insta::assert_snapshot!(redacted(&output), @"
-    WARN 6 of the first 10 replies were cut at the token limit before any text: a reasoning model needs a larger
+    WARN 6 of the first 10 replies were cut at the token limit with no answer: a reasoning model needs a larger
        --max-tokens, or a lower --reasoning-effort
     ");
     let rows = [(5, Value::Null), (10, json!("The answer is C"))];
@@ -564,7 +564,7 @@ fn null_or_refused_reply_is_unanswered() {
     assert!((row["value"].as_f64().unwrap() - 1.0 / 3.0).abs() < 1e-12);
     insta::assert_snapshot!(called.lines_with("without an answer"), @r#"
     exit code: 0
-    2 without an answer (none in a file, or no "A:" in the reply of a blind model):
+    2 without an answer (none in a file, only thoughts, no "A:" of a blind model):
     "#);
     // Asked and answered: the same command asks neither again.
     let again = house.call(&words(&line));

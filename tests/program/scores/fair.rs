@@ -238,7 +238,7 @@ fn earlier_parsing_is_reported() {
         ["run/records.jsonl", "run/manifest.json"].map(|name| bench.path(name));
     let read_manifest =
         || -> Value { serde_json::from_slice(&fs::read(&manifest).unwrap()).unwrap() };
-    assert_eq!(read_manifest()["reply_reading"], "lenient/4");
+    assert_eq!(read_manifest()["reply_reading"], "lenient/5");
     assert!(!bench.complete(&["report", "run"]).contains("differently"));
     // As an earlier version read them.
     let old: String = fs::read_to_string(&records)
@@ -252,9 +252,9 @@ fn earlier_parsing_is_reported() {
         })
         .collect();
     // The first version has no name in a manifest.
-    for (stored, named) in [(None, "lenient/1"), (Some("lenient/3"), "lenient/3")] {
+    for (stored, named) in [(None, "lenient/1"), (Some("lenient/4"), "lenient/4")] {
         let change = format!(
-            "lenient/4 reads 6 of 6 replies differently than {named}: the lenient accuracy is 0.0 %, and was 100.0 %"
+            "lenient/5 reads 6 of 6 replies differently than {named}: the lenient accuracy is 0.0 %, and was 100.0 %"
         );
         fs::write(&records, &old).unwrap();
         let mut earlier = read_manifest();
@@ -273,7 +273,7 @@ fn earlier_parsing_is_reported() {
             rescored.starts_with(&format!("6 of 6 records now read differently\n{change}\n")),
             "{rescored}"
         );
-        assert_eq!(read_manifest()["reply_reading"], "lenient/4");
+        assert_eq!(read_manifest()["reply_reading"], "lenient/5");
         assert!(!bench.complete(&["report", "run"]).contains("differently"));
     }
 }
@@ -295,12 +295,12 @@ fn unanswered_replies_show_their_reason() {
     insta::assert_snapshot!(called.lines_with("token limit"), @"
     exit code: 0
     of the unparsed replies 10 cut at the token limit (--max-tokens), 1 refused, 1 withheld by a filter
-    WARN 10 of the first 10 replies were cut at the token limit before any text: a reasoning model needs a larger
+    WARN 10 of the first 10 replies were cut at the token limit with no answer: a reasoning model needs a larger
         --max-tokens, or a lower --reasoning-effort
     ");
     insta::assert_snapshot!(called.messages(), @"
     exit code: 0
-     WARN 10 of the first 10 replies were cut at the token limit before any text: a reasoning model needs a larger
+     WARN 10 of the first 10 replies were cut at the token limit with no answer: a reasoning model needs a larger
         --max-tokens, or a lower --reasoning-effort
     ");
 }

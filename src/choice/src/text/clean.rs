@@ -1,66 +1,15 @@
-//! Removal of hidden reasoning, invisible characters and leaked template tokens from a reply.
+//! Removal of invisible characters and leaked template tokens from a reply.
 
 use std::sync::LazyLock;
 
 use regex::Regex;
-use serde::Deserialize;
 use unicode_normalization::UnicodeNormalization;
-
-use darkqa_ground::types::questions::UnreadReason;
-
-/// Regular expressions for the begin and end of reasoning in one model family, a table of `reasoning.toml`.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct ReasoningMark {
-    #[expect(dead_code, reason = "documents the table")]
-    family: String,
-    #[expect(dead_code, reason = "documents the table")]
-    source: String,
-    begin: String,
-    end: String,
-}
-
-#[derive(Debug, Default, Deserialize)]
-struct ReasoningMarks {
-    mark: Vec<ReasoningMark>,
-}
-
-static MARKS: LazyLock<Vec<ReasoningMark>> = LazyLock::new(|| {
-    let marks: ReasoningMarks =
-        toml::from_str(include_str!("../reasoning.toml")).unwrap_or_default();
-    marks.mark
-});
-
-/// Marks that end a reasoning block.
-static END: LazyLock<Regex> = LazyLock::new(|| {
-    let ends: Vec<String> = MARKS
-        .iter()
-        .map(|mark| format!("(?:{})", mark.end))
-        .collect();
-    compiled(&format!("(?i){}", ends.join("|")))
-});
-
-/// Marks that begin a reasoning block.
-static BEGIN: LazyLock<Regex> = LazyLock::new(|| {
-    let begins: Vec<String> = MARKS
-        .iter()
-        .map(|mark| format!("(?:{})", mark.begin))
-        .collect();
-    compiled(&format!("(?i){}", begins.join("|")))
-});
-
-/// The name of Gemma's reasoning channel alone on the first line. A server that drops special tokens leaves only this name.
-static CHANNEL_NAME: LazyLock<Regex> = LazyLock::new(|| compiled(r"\A\s*thought[ \t]*\r?\n"));
-
-/// The end of the harmony format's final channel.
-static HARMONY_CLOSE: LazyLock<Regex> =
-    LazyLock::new(|| compiled(r"(?i)<\|(?:return|end)\|>\s*\z"));
 
 /// Tokens that end a model's turn.
 static TURN_END: LazyLock<Regex> = LazyLock::new(|| {
     compiled(concat!(
         r"(?i)<\|\s*(?:im_end|eot_id|eot|eom_id|end|endoftext|end[_▁]of[_▁](?:text|turn|sentence|message)|return|eos",
-        r"|end_response|end_of_turn_token|assistant_end|call)\s*\|>",
+        r"|end_response|end_of_turn_token|assistant_end|call)\s*\|>|\[\|\s*end[_▁ ]?of[_▁ ]?\w+\s*\|\]",
         r"|</s>|<eos>|<end_of_turn>|<end_of_utterance>|<turn\|>|\[eos\]|\[end\]"
     ))
 });
@@ -70,7 +19,7 @@ static TOKEN: LazyLock<Regex> = LazyLock::new(|| {
     compiled(concat!(
         r"(?i)<\|(?:im_start|start_header_id|start|role)\|>\s*(?:assistant|model|system)?(?:\s*<\|end_header_id\|>)?",
         r"|<start_of_turn>\s*(?:model|assistant)?",
-        r"|<\|[^|<>\s]{1,40}\|>|<s>|<bos>|<pad>|<unk>|<image>|\[/?inst\]|<</?sys>>"
+        r"|<\|[^|<>\n]{1,40}\|?>|<[^|<>\s]{1,40}\|>|\[\|[^|\[\]\n]{1,40}\|\]|<s>|<bos>|<pad>|<unk>|<image>|\[/?inst\]|<</?sys>>"
     ))
 });
 
@@ -81,36 +30,6 @@ static NEXT_TURN: LazyLock<Regex> = LazyLock::new(|| {
         r"|вопрос|问题|問題|質問|질문)\s*\d*\s*\**\s*:"
     ))
 });
-
-/// The text after the last reasoning block, trimmed.
-///
-/// # Errors
-/// The reason why no answer can be read, if the reasoning does not end or no text follows.
-pub(crate) fn without_reasoning(reply: &str) -> Result<&str, UnreadReason> {
-    let (mut text, marker) = match END.find_iter(reply).last() {
-        Some(marker) => (&reply[marker.end()..], marker.as_str()),
-        None => (reply, ""),
-    };
-    if BEGIN.is_match(text) {
-        return Err(UnreadReason::Truncated);
-    }
-    if marker.ends_with("<|message|>")
-        && let Some(close) = HARMONY_CLOSE.find(text)
-    {
-        text = &text[..close.start()];
-    }
-    match text.trim_matches(is_blank) {
-        "" => Err(UnreadReason::Empty),
-        text => Ok(text),
-    }
-}
-
-/// The text after the name of a reasoning channel whose marks a server dropped; `None` without such a name. The end of the reasoning is
-/// unknown.
-pub(crate) fn after_channel_name(text: &str) -> Option<&str> {
-    let name = CHANNEL_NAME.find(text)?;
-    Some(text[name.end()..].trim_matches(is_blank))
-}
 
 /// Normalizes a text to NFKC, removes invisible characters and template tokens, and cuts it at the end of the first turn that contains
 /// text.
@@ -153,7 +72,7 @@ fn is_invisible(c: char) -> bool {
         | '\u{2060}'..='\u{206f}' | '\u{fe00}'..='\u{fe0f}' | '\u{feff}' | '\u{e0000}'..='\u{e01ef}')
 }
 
-fn is_blank(c: char) -> bool {
+pub(super) fn is_blank(c: char) -> bool {
     c.is_whitespace() || is_invisible(c)
 }
 

@@ -2,8 +2,11 @@
 
 mod clauses;
 pub(super) mod clean;
+mod headings;
+mod marks;
 mod plain;
 mod ranges;
+pub(super) mod reasoning;
 mod refusal;
 mod tokens;
 pub(super) mod words;

@@ -46,8 +46,8 @@ pub use records::{
 };
 #[cfg(feature = "program")]
 pub use replies::{
-    AnswerSource, Control, Finish, LostAttempts, Observed, OptionProbabilities, Reply, ServiceTier,
-    StatedCost, Thought, TokenChances, TokenPosition, Unstated, Usage,
+    AnswerSource, Control, Finish, LostAttempts, Observed, OptionProbabilities, OtherField, Reply,
+    ServiceTier, StatedCost, Thought, TokenChances, TokenPosition, Unstated, Usage,
 };
 pub use text::shell_word;
 pub use values::{Digest, Distinct, Shared};

@@ -2,17 +2,17 @@
 
 use crate::choice::llm_match::{Protocol, mark};
 use crate::choice::option_probabilities::option_probabilities;
-use crate::choice::{LENIENT_VERSION, readings};
+use crate::choice::{LENIENT_VERSION, has_thoughts, readings};
 use darkqa_ground::error::Result;
 use darkqa_ground::types::records::Record;
 use darkqa_ground::types::{
-    Answer, ChoiceDetail, Choices, Finish, OpenDetail, Reply, Step, StoredDetail, TrialOutcome,
-    UnreadReason,
+    Answer, ChoiceDetail, Choices, Finish, OpenDetail, OptionProbabilities, Reply, Step,
+    StoredDetail, TrialOutcome, UnreadReason,
 };
 
 /// Part of a record that stores the answer parsed from a reply.
 pub trait Detail: StoredDetail {
-    /// Version of the parsing rules, such as `lenient/4`; `None` if no choice is parsed.
+    /// Version of the parsing rules, such as `lenient/5`; `None` if no choice is parsed.
     const REPLY_READING: Option<&'static str>;
 
     /// Parses the answer in a reply and stores it. A stored reply can be parsed again.
@@ -55,7 +55,11 @@ impl Detail for ChoiceDetail {
         self.lenient = Some(lenient.into());
         // A stored reply lacks the observer's findings and the probabilities of the choices, so the stored ones are kept.
         if let Some(chances) = &reply.chances {
-            self.options = option_probabilities(chances, &self.choices);
+            let options = option_probabilities(chances, &self.choices);
+            self.options = options.map(|options| OptionProbabilities {
+                reasoned: options.reasoned || has_thoughts(&reply.text),
+                ..options
+            });
         }
         if reply.observed.is_some() {
             self.observed.clone_from(&reply.observed);

@@ -94,7 +94,7 @@ fn people_may_answer_freely() {
     insta::assert_snapshot!(called.lines_with("answer"), @r#"
     exit code: 0
     2 of 2 answers scored
-    1 without an answer (none in a file, or no "A:" in the reply of a blind model):
+    1 without an answer (none in a file, only thoughts, no "A:" of a blind model):
     "#);
     let images = format!("{}/images/", house.0.path("study").display());
     let strange: Vec<String> = browser

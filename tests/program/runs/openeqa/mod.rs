@@ -4,6 +4,7 @@ mod costs;
 mod marks;
 mod prompts;
 mod resume;
+mod thoughts;
 mod walks;
 
 use base64::Engine as _;

@@ -162,7 +162,7 @@ fn blind_models_follow_upstream() {
         the widest 95 % interval over 2 episodes reaches down and up
     m without images: 66.7 [1.3–99.7], n 3
     3 of 3 answers scored
-    1 without an answer (none in a file, or no "A:" in the reply of a blind model):
+    1 without an answer (none in a file, only thoughts, no "A:" of a blind model):
      scored 0, unjudged
     run: run
     report: run/report.html

@@ -236,7 +236,7 @@ pub struct RunManifest {
     /// The flags that determine the images, as the user wrote them; empty in runs of earlier versions.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub images: BTreeMap<String, Value>,
-    /// The version of the lenient reply parser that produced the records, such as `lenient/4`.
+    /// The version of the lenient reply parser that produced the records, such as `lenient/5`.
     ///
     /// `None` in runs of open-ended questions, and in runs of earlier versions of this program, which used [`FIRST_REPLY_READING`].
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -9,5 +9,5 @@ mod stated_cost;
 pub use control::{Control, OBSERVER};
 pub use observed::{AnswerSource, Observed};
 pub use option_probabilities::{OptionProbabilities, Thought, TokenChances, TokenPosition};
-pub use reply::{Finish, LostAttempts, Reply, Unstated, Usage};
+pub use reply::{Finish, LostAttempts, OtherField, Reply, Unstated, Usage};
 pub use stated_cost::{ServiceTier, StatedCost};

@@ -238,6 +238,17 @@ pub struct Reply {
     /// True if another try may end in another way: the server's word for the end is not known, or the model thought and gave no answer.
     /// Not stored.
     pub may_heal: bool,
+    /// The field with the only text of a reply without content; `None` for every other reply.
+    pub other_field: Option<OtherField>,
+}
+
+/// A field of a response, other than that of the content, with its text.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct OtherField {
+    /// The field: `reasoning_content`, the arguments of a tool call.
+    pub name: String,
+    /// The text.
+    pub text: String,
 }
 
 impl Reply {
@@ -258,6 +269,7 @@ impl Reply {
             observed: None,
             chances: None,
             may_heal: false,
+            other_field: None,
         }
     }
 }
