@@ -10,6 +10,7 @@ use crate::engine::settings::JobSettings;
 use crate::error::Result;
 use crate::images::frames::input_summary;
 use crate::images::recipes::image_words::ImageWords;
+use crate::runs::divisions::tasks_setting;
 use crate::runs::renamed::{self, SettingsChange};
 use crate::store::now;
 use crate::types::manifests::{Counts, RunManifest, RunPart, Status};
@@ -33,6 +34,7 @@ pub(crate) fn run_manifest<E: Experiment>(
         .map(|(field, value)| (field.to_owned(), value))
         .collect();
     settings.extend(notes.clone());
+    settings.extend(job.tasks.map(tasks_setting));
     let mut columns = stored
         .as_ref()
         .map_or_else(Default::default, |stored| stored.columns.clone());

@@ -8,5 +8,7 @@ mod parts_of_commands;
 mod pins;
 mod plan;
 mod shards;
+#[cfg(unix)]
+mod slurm_jobs;
 mod walks;
 mod walks_in_parts;
