@@ -146,7 +146,9 @@ async fn listen(listener: TcpListener, state: Arc<ServerState>, progress: &Progr
         }
     });
     let mut interrupt = Interrupt::listen()?;
-    connections::answer_until(listener, service, interrupt.next()).await;
+    // Dropped after the first interrupt, so that a second one ends the process at once.
+    let interrupted = async move { interrupt.next().await };
+    connections::answer_until(listener, service, interrupted).await;
     Ok(())
 }
 
