@@ -42,5 +42,5 @@ pub use requests::{
 };
 pub(crate) use requests::{ImageLimit, ImagePlaces, RequestArgs, by_flag};
 pub use secrets::Secret;
-pub(crate) use secrets::{KeyHeader, is_secret_name, is_secret_value, looks_like_key};
+pub(crate) use secrets::{KeyHeader, is_secret_header, is_secret_value, looks_like_key};
 pub use wire_kind::WireSetting;
