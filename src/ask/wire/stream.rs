@@ -1,5 +1,6 @@
 //! Event streams of replies: [`events`] parses a stream, [`assemble`] joins the chunks of a chat completion.
 
+use super::chat_reply::refusal_field;
 use serde_json::{Map, Value, json};
 
 use crate::ask::replies::bounded_json::{MAX_ITEMS, parse};
@@ -94,8 +95,8 @@ fn extend_bounded(joined: &mut Vec<Value>, more: &[Value]) {
     joined.extend(more.iter().take(room).cloned());
 }
 
-/// Text fields of a chunk besides its content.
-const TEXT_FIELDS: [&str; 3] = ["refusal", "reasoning_content", "reasoning"];
+/// Text fields of a chunk besides its content and refusal.
+const TEXT_FIELDS: [&str; 2] = ["reasoning_content", "reasoning"];
 
 impl JoinedChoice {
     /// Adds the next chunk of the choice.
@@ -110,8 +111,10 @@ impl JoinedChoice {
             Some(Value::Array(parts)) => extend_bounded(&mut self.content, parts),
             _ => {}
         }
-        for field in TEXT_FIELDS {
-            if let Some(text) = delta.and_then(|delta| delta.get(field)?.as_str()) {
+        let texts = TEXT_FIELDS.map(|field| (field, delta.and_then(|delta| delta.get(field)?.as_str())));
+        let refusal = ("refusal", delta.and_then(refusal_field));
+        for (field, text) in texts.into_iter().chain([refusal]) {
+            if let Some(text) = text {
                 let joined = self.texts.entry(field).or_insert_with(|| json!(""));
                 append(joined, text);
             }
