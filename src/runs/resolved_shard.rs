@@ -102,7 +102,11 @@ impl ResolvedShard {
         let what = if is_repeated {
             format!("task {} of the Slurm array {tasks} again", task.number)
         } else {
-            format!("task {} of a Slurm array of {}", shard.index() + 1, shard.count())
+            format!(
+                "task {} of a Slurm array of {}",
+                shard.index() + 1,
+                shard.count()
+            )
         };
         let doubt = doubt.map_or_else(String::new, |reason| {
             format!(
@@ -188,7 +192,9 @@ fn unknown_part(
             [0, 1].into_iter().filter_map(move |first| {
                 let shard = Shard::new(number.checked_sub(first)?, *count)?;
                 let last = count.get() - 1 + first;
-                Some(format!("--shard {shard} for task {number} of {first}-{last}"))
+                Some(format!(
+                    "--shard {shard} for task {number} of {first}-{last}"
+                ))
             })
         })
         .collect();

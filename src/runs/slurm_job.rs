@@ -48,10 +48,7 @@ pub(super) fn ask_scontrol(job: u32) -> Membership {
     match answer {
         Ok(text) => parse(&text.unwrap_or_default(), job)
             .unwrap_or_else(|| unknown(format!("does not know job {job}"))),
-        Err(_) => unknown(format!(
-            "did not answer within {} s",
-            TIME_LIMIT.as_secs()
-        )),
+        Err(_) => unknown(format!("did not answer within {} s", TIME_LIMIT.as_secs())),
     }
 }
 

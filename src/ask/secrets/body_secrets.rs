@@ -106,7 +106,10 @@ mod tests {
                 json!({"vertex_credentials": {"type": "service_account", "project_id": "0123"}}),
                 "vertex_credentials",
             ),
-            (json!({"a": "{\"type\": \"service_account\", \"b\": \"0123\"}"}), "a"),
+            (
+                json!({"a": "{\"type\": \"service_account\", \"b\": \"0123\"}"}),
+                "a",
+            ),
             (json!({"jwk": {"kty": "OKP", "d": "0123"}}), "jwk"),
         ] {
             let error = refusal(&fields).unwrap_err();

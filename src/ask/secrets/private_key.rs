@@ -2,12 +2,17 @@
 
 use base64::Engine as _;
 use base64::alphabet::{STANDARD, URL_SAFE};
-use base64::engine::general_purpose::{GeneralPurpose, GeneralPurposeConfig};
 use base64::engine::DecodePaddingMode;
+use base64::engine::general_purpose::{GeneralPurpose, GeneralPurposeConfig};
 use serde_json::Value;
 
 /// Texts that only files with private keys have: PEM of any kind, PGP, PuTTY, and age.
-const MARKS: [&str; 4] = ["PRIVATE KEY-----", "PRIVATE KEY BLOCK-----", "PuTTY-User-Key-File", "AGE-SECRET-KEY-"];
+const MARKS: [&str; 4] = [
+    "PRIVATE KEY-----",
+    "PRIVATE KEY BLOCK-----",
+    "PuTTY-User-Key-File",
+    "AGE-SECRET-KEY-",
+];
 
 /// Maximum length of a text that is decoded from base64, in bytes (chosen). The largest private keys in use have 13 kB.
 const MAX_ENCODED: usize = 64 << 10;
@@ -21,8 +26,7 @@ pub(super) fn is_private_key(text: &str) -> bool {
 /// `service_account`.
 pub(super) fn is_key_object(fields: &serde_json::Map<String, Value>) -> bool {
     let has = |name: &str| fields.get(name).is_some_and(Value::is_string);
-    let is_account =
-        fields.get("type").and_then(Value::as_str) == Some("service_account");
+    let is_account = fields.get("type").and_then(Value::as_str) == Some("service_account");
     is_account || has("kty") && (has("d") || has("k"))
 }
 
@@ -42,7 +46,9 @@ fn decode(text: &str) -> Option<String> {
     let config =
         GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent);
     [STANDARD, URL_SAFE].iter().find_map(|alphabet| {
-        let bytes = GeneralPurpose::new(alphabet, config).decode(&letters).ok()?;
+        let bytes = GeneralPurpose::new(alphabet, config)
+            .decode(&letters)
+            .ok()?;
         String::from_utf8(bytes).ok()
     })
 }

@@ -88,7 +88,10 @@ fn first_choice(completion: &Value) -> Result<&Value, &'static str> {
 /// The refusal of a message or of a piece of one: its field `refusal`, or that of one of its objects. LiteLLM keeps fields that it does not
 /// know in `provider_specific_fields`, LangChain in `additional_kwargs`.
 pub(super) fn refusal_field(message: &Value) -> Option<&str> {
-    let objects = message.as_object().into_iter().flat_map(|fields| fields.values());
+    let objects = message
+        .as_object()
+        .into_iter()
+        .flat_map(|fields| fields.values());
     std::iter::once(message)
         .chain(objects.filter(|value| value.is_object()))
         .filter_map(|value| value.get("refusal")?.as_str())
@@ -190,7 +193,12 @@ mod tests {
             let streamed = read(delta.as_bytes(), "text/event-stream").unwrap();
             assert_eq!(streamed.refusal.as_deref(), Some("no"), "{field}");
         }
-        for field in [r#"{"refusal":null}"#, r#"{"refusal":""}"#, r#"{"a":"no"}"#, "7"] {
+        for field in [
+            r#"{"refusal":null}"#,
+            r#"{"refusal":""}"#,
+            r#"{"a":"no"}"#,
+            "7",
+        ] {
             let body = format!(r#"{{"content":"B","provider_specific_fields":{field}}}"#);
             assert_eq!(message(&body).refusal, None, "{field}");
         }

@@ -111,7 +111,8 @@ impl JoinedChoice {
             Some(Value::Array(parts)) => extend_bounded(&mut self.content, parts),
             _ => {}
         }
-        let texts = TEXT_FIELDS.map(|field| (field, delta.and_then(|delta| delta.get(field)?.as_str())));
+        let texts =
+            TEXT_FIELDS.map(|field| (field, delta.and_then(|delta| delta.get(field)?.as_str())));
         let refusal = ("refusal", delta.and_then(refusal_field));
         for (field, text) in texts.into_iter().chain([refusal]) {
             if let Some(text) = text {

@@ -16,10 +16,7 @@ const PROMPT: Duration = Duration::from_secs(20);
 
 /// Commands that run for many seconds, and a path that exists soon after they have begun.
 const LONG: [(&str, &str); 3] = [
-    (
-        "rooms --out rooms --frames 3000 --size 640x480",
-        "rooms",
-    ),
+    ("rooms --out rooms --frames 3000 --size 640x480", "rooms"),
     (
         "synthesize frames --levels L1,L2,L3,L4,L5 --out dark",
         "dark",

@@ -26,7 +26,9 @@ impl Bench {
         let script = self.file("bin/scontrol", format!("#!/bin/sh\n{scontrol}\n"));
         fs::set_permissions(&script, fs::Permissions::from_mode(0o755)).unwrap();
         let path = std::env::var_os("PATH").unwrap_or_default();
-        let path = [self.path("bin")].into_iter().chain(std::env::split_paths(&path));
+        let path = [self.path("bin")]
+            .into_iter()
+            .chain(std::env::split_paths(&path));
         let line = format!("--model random --levels L0,L2 --no-parquet {line}");
         let Task(number, count, first, last) = task;
         let variables = [
@@ -84,18 +86,21 @@ fn repeated_tasks_do_the_same_parts() {
     };
     let before = ALL.map(keys);
     // --array=2, --array=1,3 and --array=2-3.
-    for (tasks, count, first, last) in [
-        (&[2][..], 1, 2, 2),
-        (&[1, 3], 2, 1, 3),
-        (&[2, 3], 2, 2, 3),
-    ] {
+    for (tasks, count, first, last) in [(&[2][..], 1, 2, 2), (&[1, 3], 2, 1, 3), (&[2, 3], 2, 2, 3)]
+    {
         for number in tasks {
             fs::remove_dir_all(bench.path("run").join(ALL[*number as usize])).unwrap();
         }
         for number in tasks {
-            let again = bench.job(TASK, 120 + number, Task(*number, count, first, last), "--out run");
+            let again = bench.job(
+                TASK,
+                120 + number,
+                Task(*number, count, first, last),
+                "--out run",
+            );
             assert_eq!(again.code, Some(0), "{again:?}");
-            let said = format!("task {number} of the Slurm array 0-3 again: this process does shard");
+            let said =
+                format!("task {number} of the Slurm array 0-3 again: this process does shard");
             assert!(again.stderr.contains(&said), "{again:?}");
         }
         assert_eq!(bench.parts("run"), ALL, "{tasks:?}");
@@ -113,7 +118,11 @@ fn a_smaller_array_from_the_same_number_is_another_division() {
     let task = bench.job(TASK, 130, Task(0, 2, 0, 1), "--out run");
     assert_eq!(task.code, Some(0), "{task:?}");
     assert!(task.stderr.contains("does shard 1/2"), "{task:?}");
-    assert!(task.stderr.contains("copied from parts of another division"), "{task:?}");
+    assert!(
+        task.stderr
+            .contains("copied from parts of another division"),
+        "{task:?}"
+    );
 }
 
 #[test]
@@ -147,7 +156,10 @@ fn the_only_task_of_a_new_array_says_that_it_does_everything() {
      WARN SLURM_ARRAY_TASK_COUNT is 1: the only task of a Slurm array does everything; --shard I/N does one part
     ");
     assert!(bench.path("run/records.jsonl").exists());
-    assert!(!bench.path("asked").exists(), "the answer would change nothing");
+    assert!(
+        !bench.path("asked").exists(),
+        "the answer would change nothing"
+    );
 }
 
 #[test]
