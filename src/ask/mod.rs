@@ -45,6 +45,6 @@ pub use requests::{
 };
 pub(crate) use requests::{ChangedSetting, ImageLimit, ImagePlaces, RequestArgs, by_flag};
 pub use secrets::Secret;
-pub(crate) use secrets::{KeyHeader, is_secret_name, is_secret_value, looks_like_key};
+pub(crate) use secrets::{KeyHeader, is_secret_header, is_secret_value, looks_like_key};
 pub(crate) use wire::is_context_full;
 pub use wire_kind::WireSetting;

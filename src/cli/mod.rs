@@ -21,6 +21,7 @@ use clap::{ArgMatches, FromArgMatches as _};
 use clap_complete::Shell;
 use tracing_subscriber::EnvFilter;
 
+use crate::engine::interrupt::{INTERRUPTED, end_at_interrupts};
 use crate::engine::open_files::raise_limit;
 use crate::error::{Error, Result};
 use crate::images::progress::{Progress, Verbosity};
@@ -45,8 +46,6 @@ const WITH_FAILURES: u8 = 1;
 const FATAL: u8 = 2;
 /// Exit code: stopped by `--max-cost`. The same command would stop again, so a scheduler must not start it again by itself.
 const OVER_BUDGET: u8 = 3;
-/// Exit code: interrupted; the same command continues.
-const INTERRUPTED: u8 = 130;
 
 /// Default log filter. The names of all crates of this workspace begin with `darkqa_`.
 const LOGGED: &str = "darkqa_=warn";
@@ -61,6 +60,7 @@ const FIRST_STEPS: &str = "
 /// The exit code of the program, after it has carried out the command that these words name.
 #[must_use]
 pub fn main(words: impl Iterator<Item = OsString>) -> ExitCode {
+    end_at_interrupts();
     raise_limit();
     let words: Vec<OsString> = words.collect();
     let first_steps = if words.len() == 1 { FIRST_STEPS } else { "" };

@@ -11,6 +11,7 @@ use crate::error::Result;
 use crate::images::frames::input_summary;
 use crate::images::recipes::image_words::ImageWords;
 use crate::runs::changed_settings::is_kept;
+use crate::runs::divisions::tasks_setting;
 use crate::runs::renamed::{self, SettingsChange};
 use crate::store::now;
 use crate::types::manifests::{Counts, RunManifest, RunPart, Status};
@@ -39,6 +40,7 @@ pub(crate) fn run_manifest<E: Experiment>(
         kept.filter(|(key, _)| is_kept(key))
             .map(|(key, value)| (key.clone(), value.clone())),
     );
+    settings.extend(job.tasks.map(tasks_setting));
     let mut columns = stored
         .as_ref()
         .map_or_else(Default::default, |stored| stored.columns.clone());

@@ -25,8 +25,10 @@ use crate::images::recipes::image_words::ImageWords;
 use crate::images::trials::check_used;
 use crate::picture::{ImageArgs, PayloadFormat};
 use crate::runs::outcome::{RecordTable, ShowArgs, StdoutFormat};
+use crate::runs::resolved_shard::ResolvedShard;
 use crate::runs::run_plan::RunPlan;
 use crate::runs::shard::Shard;
+use crate::runs::slurm_array::TaskRange;
 use crate::store;
 use crate::types::flags::seconds;
 use crate::types::{Decides, SetLight, View};
@@ -152,6 +154,8 @@ pub(crate) struct JobSettings {
     pub money: MoneySettings,
     /// Shard of the run that this process runs.
     pub shard: Shard,
+    /// The Slurm array whose tasks do the shards; `None` for shards that the user names.
+    pub tasks: Option<TaskRange>,
     /// The longest wait for the requests in flight after an interrupt.
     pub grace: Duration,
     /// Print at the end how long each step took.
@@ -282,7 +286,12 @@ impl JobArgs {
     /// # Errors
     /// [`Error::Usage`] with the invalid flag.
     pub(crate) fn resolve(self, experiment: &ExperimentSettings) -> Result<JobSettings> {
-        let shard = Shard::resolve(self.scale.shard.as_deref(), |name| std::env::var(name).ok())?;
+        let place = RunPlace::from(self.output.clone());
+        let ResolvedShard { shard, tasks } = ResolvedShard::resolve(
+            self.scale.shard.as_deref(),
+            |name| std::env::var(name).ok(),
+            place.folder(),
+        )?;
         let defaults = self.request_defaults(experiment);
         let context = ResolveContext {
             typed: &self.typed,
@@ -297,7 +306,7 @@ impl JobArgs {
             text_baseline: experiment.text_baseline,
         };
         let mut ask = AskSettings::resolve(&self.models, &defaults, context)?;
-        let place = RunPlace::from(self.output.clone()).check_writable()?;
+        let place = place.check_writable()?;
         ask.continue_from(&place.for_shard(shard).continuation());
         Ok(JobSettings {
             light: LightSettings::resolve(&self.light, experiment.set_light)?,
@@ -310,6 +319,7 @@ impl JobArgs {
             concurrency: self.sending.concurrency,
             money: MoneySettings::resolve(&self.money, shard, &place.for_shard(shard).settings())?,
             shard,
+            tasks,
             grace: self.scale.grace,
             show_timings: self.scale.timings,
             images: self.stored,
@@ -347,15 +357,20 @@ impl From<OutputArgs> for RunPlace {
 }
 
 impl RunPlace {
+    /// The named folder.
+    fn folder(&self) -> Option<&Path> {
+        match self {
+            Self::Named(folder) | Self::Resume(folder) => Some(folder),
+            Self::Automatic => None,
+        }
+    }
+
     /// Reads the plan in the named folder; `None` if no folder is named, or if it has no plan.
     ///
     /// # Errors
     /// See [`RunPlan::read`].
     pub(crate) fn plan(&self) -> Result<Option<RunPlan>> {
-        match self {
-            Self::Named(folder) | Self::Resume(folder) => RunPlan::read(folder),
-            Self::Automatic => Ok(None),
-        }
+        self.folder().map_or(Ok(None), RunPlan::read)
     }
 
     /// The run in the named folder. Empty without a run, or if the manifest cannot be read: opening the folder reports that error.
@@ -377,10 +392,8 @@ impl RunPlace {
 
     /// Reads the manifest of the named folder; the default if no folder is named or reading fails.
     fn read_or_default<T: Default>(&self, read_manifest: fn(&Path) -> Result<T>) -> T {
-        match self {
-            Self::Named(folder) | Self::Resume(folder) => read_manifest(folder).unwrap_or_default(),
-            Self::Automatic => T::default(),
-        }
+        let read = self.folder().map(|folder| read_manifest(folder).ok());
+        read.flatten().unwrap_or_default()
     }
 
     /// Returns the choice if its folder is writable. The check runs before images are made, so that an error costs no time.

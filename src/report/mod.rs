@@ -14,6 +14,7 @@ pub(crate) mod products;
 pub(crate) mod questions;
 pub(crate) mod realism;
 pub(crate) mod report_length;
+mod script_policy;
 pub(crate) mod self_agreement;
 pub(crate) mod short;
 pub(crate) mod site;

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::script_policy::allow_script;
 use crate::error::Result;
 use crate::text::script::to_script_json;
 use crate::types::Digest;
@@ -59,7 +60,8 @@ pub(crate) fn page(items: &[StudyQuestion]) -> Result<String> {
             .map(String::as_bytes);
         std::iter::once(item.id.as_bytes()).chain(images)
     }));
-    Ok(PAGE.replacen(PLACEHOLDER, &to_script_json(&StudyPage { set, items })?, 1))
+    let page = PAGE.replacen(PLACEHOLDER, &to_script_json(&StudyPage { set, items })?, 1);
+    Ok(allow_script(&page))
 }
 
 #[cfg(test)]
@@ -81,5 +83,6 @@ mod tests {
         let page = page(&[question]).unwrap();
         assert!(!page.contains(PLACEHOLDER) && !page.contains("truth"));
         assert_eq!(page.matches("</script").count(), 1);
+        assert!(page.contains("script-src 'sha256-"), "{page}");
     }
 }

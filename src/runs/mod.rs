@@ -2,8 +2,9 @@
 //!
 //! [`stored`] reads a run, [`sharded_run`] joins the shards of one, [`record_table`] writes `records.parquet`.
 
-pub(crate) mod batch_system;
+mod batch_system;
 pub(crate) mod changed_settings;
+pub(crate) mod divisions;
 pub(crate) mod first_source;
 pub(crate) mod image_rebuilder;
 pub(crate) mod mark_index;
@@ -13,6 +14,7 @@ pub(crate) mod over_budget;
 pub(crate) mod predictions;
 pub(crate) mod record_table;
 pub(crate) mod renamed;
+pub(crate) mod resolved_shard;
 pub(crate) mod run_files;
 pub(crate) mod run_plan;
 pub(crate) mod run_texts;
@@ -22,6 +24,8 @@ pub(crate) mod shard_budget;
 pub(crate) mod shard_records;
 pub(crate) mod shard_sources;
 pub(crate) mod sharded_run;
+pub(crate) mod slurm_array;
+mod slurm_job;
 pub(crate) mod stored;
 pub(crate) mod training;
 

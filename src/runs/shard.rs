@@ -6,7 +6,6 @@ use std::str::FromStr;
 
 use crate::ask::Quota;
 use crate::error::{Error, Result};
-use crate::runs::batch_system::BatchSystem;
 
 /// One of several parts of a run, with consecutive sources. Each source is in one shard, with all its conditions and questions. See
 /// [`shard_questions`](crate::runs::shard_sources::shard_questions) for the division.
@@ -59,11 +58,20 @@ impl Shard {
         whole / f64::from(self.count.get())
     }
 
-    /// Name of the shard's folder within that of the run.
+    /// Name of the shard's folder within that of the run. [`of_folder`](Self::of_folder) parses it.
     #[must_use]
     pub(crate) fn folder(self) -> String {
         let digits = self.count.to_string().len();
         format!("shard-{:0digits$}-of-{}", self.index + 1, self.count)
+    }
+
+    /// The shard with this name of a folder; `None` for other folders.
+    pub(super) fn of_folder(name: &str) -> Option<Self> {
+        let (index, count) = name.strip_prefix("shard-")?.split_once("-of-")?;
+        Self::new(
+            index.parse::<u32>().ok()?.checked_sub(1)?,
+            count.parse().ok()?,
+        )
     }
 
     /// This shard's share of the requests and tokens per minute if `workers` shards run in parallel, by default all of them.
@@ -75,47 +83,8 @@ impl Shard {
         }
     }
 
-    /// The shard given by `--shard` (`2/4`, `auto/4`, `auto`, `none`), or, without the flag, by the batch system.
-    ///
-    /// # Errors
-    /// If there is no such shard, or the batch system does not set all required variables.
-    pub(crate) fn resolve(
-        flag: Option<&str>,
-        variable: impl Fn(&str) -> Option<String>,
-    ) -> Result<Self> {
-        let system = BatchSystem::from_environment(&variable)?;
-        match (flag, system) {
-            (Some("none"), _) | (None, None) => Ok(Self::WHOLE),
-            (Some("auto"), system) => {
-                let system = system.ok_or_else(|| usage_error(NO_SYSTEM))?;
-                Self::from_batch_system(system, None)
-            }
-            (Some(text), system) => match text.split_once('/') {
-                Some(("auto", count)) => {
-                    let system = system.ok_or_else(|| usage_error(NO_SYSTEM))?;
-                    Self::from_batch_system(system, Some(number(count, text)?))
-                }
-                _ => text.parse(),
-            },
-            (None, Some(system)) => {
-                let shard = Self::from_batch_system(system, None)?;
-                if shard.is_part() {
-                    tracing::warn!(
-                        "{system}: this process does shard {shard}; --shard none does everything"
-                    );
-                }
-                Ok(shard)
-            }
-        }
-    }
-
-    /// The shard of this process in a batch system.
-    fn from_batch_system(system: BatchSystem, count: Option<NonZeroU32>) -> Result<Self> {
-        let (index, count) = system.index_and_count(count)?;
-        Ok(Self { index, count })
-    }
-
-    fn new(index: u32, count: NonZeroU32) -> Option<Self> {
+    /// The shard with an index from 0; `None` if the index is not below `count`.
+    pub(super) fn new(index: u32, count: NonZeroU32) -> Option<Self> {
         (index < count.get()).then_some(Self { index, count })
     }
 }
@@ -136,10 +105,7 @@ impl fmt::Display for Shard {
     }
 }
 
-const NO_SYSTEM: &str = "auto is for a task of a Slurm array (SLURM_ARRAY_TASK_ID) or a pod of an indexed Kubernetes job \
-                         (JOB_COMPLETION_INDEX), and this is neither";
-
-fn usage_error(problem: impl fmt::Display) -> Error {
+pub(super) fn usage_error(problem: impl fmt::Display) -> Error {
     Error::usage("--shard", problem)
 }
 
@@ -149,62 +115,17 @@ fn not_a_shard(text: &str) -> Error {
     ))
 }
 
-fn number(text: &str, whole: &str) -> Result<NonZeroU32> {
+/// The number of shards in the text `whole` of a flag.
+///
+/// # Errors
+/// If it is not a positive number.
+pub(super) fn number(text: &str, whole: &str) -> Result<NonZeroU32> {
     text.trim().parse().map_err(|_| not_a_shard(whole))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn resolved(text: Option<&str>, variables: &[(&str, &str)]) -> Result<Shard> {
-        Shard::resolve(text, |name| {
-            variables
-                .iter()
-                .find(|(known, _)| *known == name)
-                .map(|(_, value)| (*value).to_owned())
-        })
-    }
-
-    const TASK: [(&str, &str); 4] = [
-        ("SLURM_ARRAY_TASK_ID", "5"),
-        ("SLURM_ARRAY_TASK_MIN", "1"),
-        ("SLURM_ARRAY_TASK_STEP", "2"),
-        ("SLURM_ARRAY_TASK_COUNT", "4"),
-    ];
-
-    #[test]
-    fn shards_are_read_from_the_flag_and_the_batch_system() {
-        let pod = [("JOB_COMPLETION_INDEX", "2")];
-        for (text, variables, expected) in [
-            (None, &[][..], "1/1"),
-            (Some("2/4"), &[], "2/4"),
-            (Some("4/4"), &TASK, "4/4"),
-            (Some("none"), &TASK, "1/1"),
-            (None, &TASK, "3/4"),
-            (Some("auto"), &TASK, "3/4"),
-            (Some("auto/4"), &TASK, "3/4"),
-            (Some("auto/8"), &pod, "3/8"),
-            (Some("none"), &pod, "1/1"),
-            // An array of one task does everything.
-            (None, &[("SLURM_ARRAY_TASK_ID", "7")], "1/1"),
-        ] {
-            let shard = resolved(text, variables).unwrap();
-            assert_eq!(shard.to_string(), expected, "{text:?}");
-        }
-        for (text, variables, message) in [
-            (Some("0/4"), &[][..], "a part expected, as 2/4"),
-            (Some("5/4"), &[], "a part expected"),
-            (Some("1"), &[], "a part expected"),
-            (Some("auto"), &[], "auto is for a task"),
-            (Some("auto/2"), &pod, "beyond the 2 parts"),
-            (Some("auto/3"), &TASK, "has 4 tasks, not 3"),
-            (None, &pod, "--shard auto/N"),
-        ] {
-            let error = resolved(text, variables).unwrap_err().to_string();
-            assert!(error.contains(message), "{text:?}: {error}");
-        }
-    }
 
     fn number(n: u32) -> NonZeroU32 {
         NonZeroU32::new(n).unwrap()
@@ -232,5 +153,9 @@ mod tests {
         assert_eq!(parts[1].folder(), "shard-2-of-3");
         let many = Shard::new(6, number(256)).unwrap();
         assert_eq!(many.folder(), "shard-007-of-256");
+        assert_eq!(Shard::of_folder("shard-007-of-256"), Some(many));
+        for other in ["plan", "shard-0-of-2", "shard-3-of-2", "shard-1-of-x"] {
+            assert_eq!(Shard::of_folder(other), None, "{other}");
+        }
     }
 }

@@ -3,6 +3,7 @@
 use clap::Args;
 
 use crate::error::{Error, Result};
+use crate::runs::resolved_shard::ResolvedShard;
 use crate::runs::shard::Shard;
 use crate::runs::shard_sources::{WeightedSource, shard_range};
 use crate::types::Decides;
@@ -34,7 +35,8 @@ impl ShardArgs {
 /// If there is no such shard, or the variables of the batch system do not determine it.
 pub(crate) fn shard_from_flag(flag: Option<&str>) -> Result<Shard> {
     let flag = flag.unwrap_or("none");
-    Shard::resolve(Some(flag), |name| std::env::var(name).ok())
+    ResolvedShard::resolve(Some(flag), |name| std::env::var(name).ok(), None)
+        .map(|resolved| resolved.shard)
 }
 
 /// Keeps the frames of a shard. All frames cost the same.

@@ -3,7 +3,7 @@
 use reqwest::header::{HeaderMap, HeaderName, HeaderValue};
 
 use super::variable::variable;
-use crate::ask::secrets::{is_secret_name, is_secret_value, looks_like_key};
+use crate::ask::secrets::{is_secret_header, looks_like_key};
 use crate::error::{Error, Result};
 
 /// Headers that the user cannot set, because the program or its HTTP library sets them.
@@ -57,7 +57,7 @@ impl CustomHeaders {
             Error::usage("--header", "'NAME: VALUE' expected, as 'X-Team: vision'")
         })?;
         let (name, value) = (name.trim(), value.trim());
-        if is_secret_value(value) || (is_secret_name(name) && value.len() >= 20) {
+        if is_secret_header(name, value) {
             return Err(Error::usage(
                 "--header",
                 format_args!(

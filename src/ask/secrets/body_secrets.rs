@@ -3,10 +3,12 @@
 use serde_json::{Map, Value};
 
 use super::key_form::{is_secret_name, is_secret_value};
+use super::private_key::is_key_object;
 use crate::error::{Error, Result};
 
 /// Suffixes of field names whose values are always secrets; lower-case letters and digits only.
-const SECRET_SUFFIXES: [&str; 8] = [
+const SECRET_SUFFIXES: [&str; 9] = [
+    "privatekey",
     "apikey",
     "accesskey",
     "secretkey",
@@ -16,9 +18,6 @@ const SECRET_SUFFIXES: [&str; 8] = [
     "accesstoken",
     "authtoken",
 ];
-
-/// Fields whose names look secret but whose long values are not.
-const NOT_SECRET: [&str; 2] = ["prompt_cache_key", "tokenizer"];
 
 /// Minimum length at which the value of a field with a secret-looking name counts as a secret; chosen.
 const MIN_LENGTH: usize = 20;
@@ -42,6 +41,7 @@ fn refuse_in_field(name: &str, value: &Value) -> Result<()> {
         Value::Array(items) => items
             .iter()
             .try_for_each(|item| refuse_in_field(name, item)),
+        Value::Object(fields) if is_key_object(fields) => secret_error(name),
         Value::Object(fields) => refuse_secrets(fields),
         _ => Ok(()),
     }
@@ -55,7 +55,7 @@ fn secret_error(name: &str) -> Result<()> {
     Err(Error::usage("--extra-body", problem))
 }
 
-/// True if the text of a field looks like a secret: it has the prefix of a key, or the field name always means a secret, or the field
+/// True if the text of a field looks like a secret: it has the form of a key, a private key or a service account, or the field name always means a secret, or the field
 /// name looks secret and the text is a long mixture of letters and digits.
 fn is_secret(name: &str, text: &str) -> bool {
     let letters: String = name
@@ -71,10 +71,9 @@ fn is_secret(name: &str, text: &str) -> bool {
             .chars()
             .all(|c| c.is_ascii_alphanumeric() || "-_.+/=:~".contains(c))
         && text.contains(|c: char| c.is_ascii_digit());
-    let has_secret_name = is_secret_name(name) && !NOT_SECRET.contains(&name);
     is_secret_value(text)
         || (has_secret_suffix && !text.is_empty())
-        || (has_secret_name && is_long_key)
+        || (is_secret_name(name) && is_long_key)
 }
 
 #[cfg(test)]
@@ -99,6 +98,19 @@ mod tests {
                 "token",
             ),
             (json!({"sk-0123456789": 1}), "the name of a field"),
+            (
+                json!({"note": "-----BEGIN PRIVATE KEY-----\n0123\n-----END PRIVATE KEY-----"}),
+                "note",
+            ),
+            (
+                json!({"vertex_credentials": {"type": "service_account", "project_id": "0123"}}),
+                "vertex_credentials",
+            ),
+            (
+                json!({"a": "{\"type\": \"service_account\", \"b\": \"0123\"}"}),
+                "a",
+            ),
+            (json!({"jwk": {"kty": "OKP", "d": "0123"}}), "jwk"),
         ] {
             let error = refusal(&fields).unwrap_err();
             let expected = format!("--extra-body: {name} looks like a secret");
@@ -112,6 +124,7 @@ mod tests {
             json!({"prompt_cache_key": "0f8fad5b-d9cb-469f-a165-70867728950e"}),
             json!({"tokenizer": "mistralai/Mistral-7B-Instruct-v0.3"}),
             json!({"eos_token": "<|end_of_text_number_2|>", "token_limit": 10, "api_key": null}),
+            json!({"tools": [{"type": "function"}], "certificate": "-----BEGIN CERTIFICATE-----"}),
             json!({"keywords": ["the colour of 20 lamps in the room"]}),
         ] {
             assert!(refusal(&fields).is_ok(), "{fields}");

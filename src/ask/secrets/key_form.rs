@@ -1,4 +1,6 @@
-//! Recognition of text that looks like a secret: [`looks_like_key`], [`is_secret_value`], [`is_secret_name`].
+//! Recognition of text that looks like a secret: [`looks_like_key`], [`is_secret_value`], [`is_secret_name`], [`is_secret_header`].
+
+use super::private_key;
 
 /// Prefixes of the keys of common vendors.
 const KEY_PREFIXES: [&str; 6] = ["sk-", "AIza", "gsk_", "xai-", "hf_", "Bearer "];
@@ -37,19 +39,117 @@ pub(super) fn is_shell_text(key: &str) -> bool {
     is_quoted || is_assigned
 }
 
-/// True if a value has the prefix of a key.
+/// True if a value has the form of a secret: the prefix of a key, a private key, a service account or a token with a signature.
 pub(crate) fn is_secret_value(value: &str) -> bool {
     KEY_PREFIXES
         .iter()
         .any(|prefix| value.starts_with(prefix) && value.len() > prefix.len())
+        || private_key::is_private_key(value)
+        || is_web_token(value)
 }
 
-/// True if a header or field of this name usually contains a secret.
+/// True for a JSON Web Token: three parts in base64, of which the first begins with `{"`.
+fn is_web_token(value: &str) -> bool {
+    let parts: Vec<&str> = value.split('.').collect();
+    let is_base64 = |part: &&str| {
+        part.len() >= MIN_LENGTH
+            && part
+                .bytes()
+                .all(|byte| byte.is_ascii_alphanumeric() || b"-_".contains(&byte))
+    };
+    parts.len() == 3 && value.starts_with("eyJ") && parts.iter().all(is_base64)
+}
+
+/// Words of names whose values are secrets, in lower case and without a plural.
+const SECRET_WORDS: [&str; 11] = [
+    "auth",
+    "authentication",
+    "authorization",
+    "bearer",
+    "cookie",
+    "credential",
+    "jwt",
+    "key",
+    "password",
+    "secret",
+    "token",
+];
+
+/// Words before `key` in names of keys that are no secrets: `Idempotency-Key`, `prompt_cache_key`.
+const PLAIN_KEYS: [&str; 6] = [
+    "affinity",
+    "cache",
+    "idempotency",
+    "partition",
+    "public",
+    "routing",
+];
+
+/// Words that are written in one with `key`: `apikey`.
+const BEFORE_KEY: [&str; 9] = [
+    "access",
+    "account",
+    "api",
+    "auth",
+    "client",
+    "license",
+    "private",
+    "secret",
+    "subscription",
+];
+
+/// True if a header or field of this name usually contains a secret: one of its words says so. A word that only contains such a word is
+/// another one: `x-portkey-trace-id`, `X-Author`, `tokenizer`.
 pub(crate) fn is_secret_name(name: &str) -> bool {
-    let name = name.to_lowercase();
-    ["auth", "key", "token", "secret", "cookie"]
-        .iter()
-        .any(|word| name.contains(word))
+    let words = name_words(name);
+    words.iter().enumerate().any(|(place, word)| {
+        let word = word.strip_suffix('s').unwrap_or(word);
+        let before = place.checked_sub(1).map(|place| words[place].as_str());
+        let is_plain_key = word == "key" && before.is_some_and(|word| PLAIN_KEYS.contains(&word));
+        let is_compound = word
+            .strip_suffix("key")
+            .is_some_and(|before| BEFORE_KEY.iter().any(|known| before.ends_with(known)))
+            || ["token", "secret", "password", "passwd", "cookie"]
+                .iter()
+                .any(|end| word.ends_with(end));
+        !is_plain_key && (SECRET_WORDS.contains(&word) || is_compound)
+    })
+}
+
+/// True if the value of a header is a secret: by its form, or by the name and a length of at least [`MIN_LENGTH`]. A name whose last word
+/// only ends with `key` (`x-mykey`) counts if the value is one long mixture of letters and digits.
+pub(crate) fn is_secret_header(name: &str, value: &str) -> bool {
+    let ends_like_key = name.to_lowercase().ends_with("key");
+    is_secret_value(value)
+        || value.len() >= MIN_LENGTH
+            && (is_secret_name(name) || ends_like_key && is_random_text(value))
+}
+
+/// True for a text of letters and digits without separators, with both: the form of most keys, but not of addresses, JSON, ids with
+/// hyphens and names.
+fn is_random_text(text: &str) -> bool {
+    text.bytes().all(|byte| byte.is_ascii_alphanumeric())
+        && text.bytes().any(|byte| byte.is_ascii_digit())
+        && text.bytes().any(|byte| byte.is_ascii_alphabetic())
+}
+
+/// The words of a name in lower case: `X-ApiKey` and `x_api_key` have the words `x`, `api` and `key`.
+fn name_words(name: &str) -> Vec<String> {
+    let mut words = vec![String::new()];
+    let mut before = ' ';
+    for letter in name.chars() {
+        let begins = !letter.is_alphanumeric()
+            || letter.is_uppercase() && (before.is_lowercase() || before.is_ascii_digit());
+        if begins {
+            words.push(String::new());
+        }
+        if let Some(word) = words.last_mut().filter(|_| letter.is_alphanumeric()) {
+            word.extend(letter.to_lowercase());
+        }
+        before = letter;
+    }
+    words.retain(|word| !word.is_empty());
+    words
 }
 
 #[cfg(test)]
@@ -72,5 +172,73 @@ mod tests {
         ] {
             assert!(looks_like_key(key), "{key}");
         }
+    }
+
+    #[test]
+    fn names_are_judged_by_their_words() {
+        for secret in [
+            "x-api-key",
+            "Authorization",
+            "Proxy-Authorization",
+            "x-portkey-api-key",
+            "X-ApiKey",
+            "apikey",
+            "x-goog-api-key",
+            "Ocp-Apim-Subscription-Key",
+            "X-Auth-Token",
+            "accessToken",
+            "authtoken",
+            "cf-access-client-secret",
+            "Set-Cookie",
+            "api_keys",
+        ] {
+            assert!(is_secret_name(secret), "{secret}");
+        }
+        for plain in [
+            "x-portkey-custom-host",
+            "x-monkey",
+            "X-Author",
+            "tokenizer",
+            "keywords",
+            "Idempotency-Key",
+            "prompt_cache_key",
+            "x-keyboard-layout",
+            "secretary",
+        ] {
+            assert!(!is_secret_name(plain), "{plain}");
+        }
+    }
+
+    #[test]
+    fn headers_are_judged_by_name_and_value() {
+        let random = "9f86d081884c7d659a2feaa0c55ad015";
+        for (name, value) in [
+            ("x-api-key", random),
+            ("x-mykey", random),
+            ("x-portkey-trace-id", "Bearer abcdefgh"),
+            ("X-Team", "sk-0123456789"),
+        ] {
+            assert!(is_secret_header(name, value), "{name}: {value}");
+        }
+        for (name, value) in [
+            ("x-portkey-custom-host", "http://127.0.0.1:8811/v1"),
+            ("x-portkey-config", r#"{"retry":{"attempts":3}}"#),
+            ("x-portkey-trace-id", "3b241101-e2bb-4255-8caf-4136c566a962"),
+            ("x-portkey-cache-namespace", "night-run-2026-11-experiment"),
+            ("Idempotency-Key", "3b241101-e2bb-4255-8caf-4136c566a962"),
+            ("x-portkey-trace-id", random),
+            ("x-api-key", "none"),
+            ("X-Team", random),
+        ] {
+            assert!(!is_secret_header(name, value), "{name}: {value}");
+        }
+    }
+
+    #[test]
+    fn web_tokens_are_secrets() {
+        let part = "eyJhbGciOiJIUzI1NiIsInR5cCI6IkpXVCJ9";
+        assert!(is_secret_value(&format!("{part}.{part}.{part}")));
+        assert!(!is_secret_value(&format!("{part}.{part}")));
+        assert!(!is_secret_value("eyJ.a.b"));
     }
 }

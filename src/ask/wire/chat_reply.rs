@@ -45,12 +45,7 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, ReplyError>
         positions,
         thought: logprobs::thought(message, completion.get("usage"), &text),
     });
-    let refusal = message
-        .get("refusal")
-        .and_then(Value::as_str)
-        .filter(|text| !text.is_empty())
-        .map(str::to_owned)
-        .or(refusal_part);
+    let refusal = refusal_field(message).map(str::to_owned).or(refusal_part);
     let has_thought = text.trim().is_empty()
         && refusal.is_none()
         && logprobs::thought(message, completion.get("usage"), &text) == Thought::Before;
@@ -105,6 +100,19 @@ fn first_choice(completion: &Value) -> Result<&Value, &'static str> {
         .find(|choice| choice.get("index").and_then(Value::as_u64) == Some(0))
         .or(choices.first())
         .ok_or("a completion with no choices in it")
+}
+
+/// The refusal of a message or of a piece of one: its field `refusal`, or that of one of its objects. LiteLLM keeps fields that it does not
+/// know in `provider_specific_fields`, LangChain in `additional_kwargs`.
+pub(super) fn refusal_field(message: &Value) -> Option<&str> {
+    let objects = message
+        .as_object()
+        .into_iter()
+        .flat_map(|fields| fields.values());
+    std::iter::once(message)
+        .chain(objects.filter(|value| value.is_object()))
+        .filter_map(|value| value.get("refusal")?.as_str())
+        .find(|text| !text.is_empty())
 }
 
 /// Error in the text of an incomplete reply, if its wording is known: LMDeploy sends errors in this way.
@@ -238,6 +246,28 @@ mod tests {
             message(r#"{"role":"assistant","content":""}"#).other_field,
             None
         );
+    }
+
+    #[test]
+    fn refusals_in_fields_of_the_provider_are_found() {
+        for field in ["provider_specific_fields", "additional_kwargs"] {
+            let body = format!(r#"{{"content":null,"refusal":null,"{field}":{{"refusal":"no"}}}}"#);
+            assert_eq!(message(&body).refusal.as_deref(), Some("no"), "{field}");
+            let delta = format!(
+                "data: {{\"choices\":[{{\"delta\":{{\"{field}\":{{\"refusal\":\"no\"}}}},\"finish_reason\":\"stop\"}}]}}\n\n"
+            );
+            let streamed = read(delta.as_bytes(), "text/event-stream").unwrap();
+            assert_eq!(streamed.refusal.as_deref(), Some("no"), "{field}");
+        }
+        for field in [
+            r#"{"refusal":null}"#,
+            r#"{"refusal":""}"#,
+            r#"{"a":"no"}"#,
+            "7",
+        ] {
+            let body = format!(r#"{{"content":"B","provider_specific_fields":{field}}}"#);
+            assert_eq!(message(&body).refusal, None, "{field}");
+        }
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Event streams of replies: [`events`] parses a stream, [`assemble`] joins the chunks of a chat completion.
 
+use super::chat_reply::refusal_field;
 use serde_json::{Map, Value, json};
 
 use crate::ask::failures::find_error;
@@ -162,6 +163,12 @@ impl JoinedChoice {
         }
         for (field, value) in delta.and_then(Value::as_object).into_iter().flatten() {
             self.add_field(field, value);
+        }
+        let own_refusal = delta.and_then(|delta| delta.get("refusal")?.as_str());
+        if own_refusal.is_none_or(str::is_empty)
+            && let Some(refusal) = delta.and_then(refusal_field)
+        {
+            self.add_field("refusal", &json!(refusal));
         }
         // Each chunk has the tokens of its own text: join the lists.
         let logprobs = choice.get("logprobs").and_then(Value::as_object);

@@ -6,13 +6,10 @@ use std::path::{Path, PathBuf};
 use toml::de::{DeTable, DeValue};
 use toml::{Spanned, Table, Value};
 
-use crate::ask::{is_secret_name, is_secret_value, looks_like_key};
+use crate::ask::{is_secret_header, is_secret_value, looks_like_key};
 use crate::error::{Error, Result};
 use crate::files::reading;
 use crate::types::text::{TomlFault, line_at};
-
-/// Minimum length in bytes of a secret header value: shorter values of headers with the name of a secret are allowed; chosen.
-const MIN_SECRET_LENGTH: usize = 20;
 
 /// The tables of a models file. Keys and values are not validated yet.
 #[derive(Debug)]
@@ -131,11 +128,12 @@ fn refuse_secrets(
 ) -> Result<()> {
     match value.get_ref() {
         DeValue::String(text) => {
-            let is_secret_header =
-                in_headers && text.len() >= MIN_SECRET_LENGTH && is_secret_name(key);
             let is_key_as_variable =
                 matches!(key, "key-env" | "key_env" | "env") && looks_like_key(text);
-            if is_secret_value(text) || is_key_as_variable || is_secret_header {
+            if is_secret_value(text)
+                || is_key_as_variable
+                || in_headers && is_secret_header(key, text)
+            {
                 let problem = format_args!(
                     "{key} looks like a secret, which is not shown here and must not be in a file of models: name a variable \
                      that holds it (key-env = \"NAME\", or {{ env = \"NAME\" }} for a header)"

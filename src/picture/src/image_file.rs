@@ -245,6 +245,14 @@ impl ImageFile {
         Ok((pixels.width() as u32, pixels.height() as u32))
     }
 
+    /// Width and height in pixels, as stored: read from the header, without decoding.
+    ///
+    /// # Errors
+    /// If the header cannot be read.
+    pub fn stored_size(&self) -> Result<(u32, u32)> {
+        Ok(self.decoder()?.dimensions())
+    }
+
     /// Decodes the file to 8-bit sRGB.
     ///
     /// # Errors

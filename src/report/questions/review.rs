@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use crate::error::Result;
+use crate::report::script_policy::allow_script;
 use crate::text::script::to_script_json;
 use crate::types::Digest;
 use darkqa_questions::GeneratedQuestion;
@@ -64,7 +65,8 @@ struct ReviewPage<'a> {
 /// If the questions cannot be serialized.
 pub(crate) fn page(items: &[ReviewItem<'_>]) -> Result<String> {
     let set = Digest::from_parts(items.iter().map(|item| item.id.as_bytes()));
-    Ok(PAGE.replacen(PLACEHOLDER, &to_script_json(&ReviewPage { set, items })?, 1))
+    let page = PAGE.replacen(PLACEHOLDER, &to_script_json(&ReviewPage { set, items })?, 1);
+    Ok(allow_script(&page))
 }
 
 #[cfg(test)]

@@ -10,6 +10,7 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use serde_json::Value;
 
 use crate::error::{Error, Result};
 use crate::files;
@@ -125,13 +126,58 @@ pub(crate) fn bundle(args: &BundleArgs) -> Result<Outcome> {
 fn check_leaks(files: &[(String, Vec<u8>)], redactor: &Redactor) -> Result<()> {
     for (name, content) in files {
         if let Some(what) = redactor.find_leak(&String::from_utf8_lossy(content)) {
+            let place = leak_place(content, redactor);
             let problem = format_args!(
-                "{what} would be in it; nothing is written. Please report this with the line of the run that holds it"
+                "{what} would be in {place}; nothing is written. Please report this with that line of the run"
             );
             return Err(Error::data(name, problem));
         }
     }
     Ok(())
+}
+
+/// The first line of a file that contains private information, with the field of its JSON: `line 3, field failure.message`.
+fn leak_place(content: &[u8], redactor: &Redactor) -> String {
+    let text = String::from_utf8_lossy(content);
+    if let Some(field) = serde_json::from_str(&text)
+        .ok()
+        .and_then(|value| leaking_field(&value, redactor))
+    {
+        return format!("the field {field}");
+    }
+    let leaking = text
+        .lines()
+        .enumerate()
+        .find(|(_, line)| redactor.find_leak(line).is_some());
+    let Some((index, line)) = leaking else {
+        return "it".to_owned();
+    };
+    let field = serde_json::from_str(line)
+        .ok()
+        .and_then(|value| leaking_field(&value, redactor));
+    let field = field.map_or_else(String::new, |field| format!(", field {field}"));
+    format!("line {}{field}", index + 1)
+}
+
+/// The path of the first field whose text or name contains private information: `failure.message`. A name that does is not shown.
+fn leaking_field(value: &Value, redactor: &Redactor) -> Option<String> {
+    let joined = |name: &str, inner: String| match inner.as_str() {
+        "" => name.to_owned(),
+        _ => format!("{name}.{inner}"),
+    };
+    match value {
+        Value::String(text) => redactor.find_leak(text).map(|_| String::new()),
+        Value::Array(items) => items.iter().enumerate().find_map(|(index, item)| {
+            leaking_field(item, redactor).map(|inner| joined(&index.to_string(), inner))
+        }),
+        Value::Object(fields) => fields.iter().find_map(|(name, item)| {
+            if redactor.find_leak(name).is_some() {
+                return Some("(a name of a field)".to_owned());
+            }
+            leaking_field(item, redactor).map(|inner| joined(name, inner))
+        }),
+        _ => None,
+    }
 }
 
 /// Names of the entries of the run folder that are not in the bundle, sorted.
@@ -169,5 +215,28 @@ fn file_name(name: &str) -> String {
     match name.trim_start_matches('.') {
         "" => "run".to_owned(),
         name => name.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_place_of_a_leak_is_named() {
+        // The folder of the run is private.
+        let redactor = Redactor::new(Path::new("/mnt/of-ann/run"));
+        for (content, expected) in [
+            (
+                "{\"reply\":\"no\"}\n{\"reply\":\"no\",\"failure\":{\"message\":\"in /mnt/of-ann/run\"}}\n",
+                "line 2, field failure.message",
+            ),
+            ("{\"a\": [\"no\", \"/mnt/of-ann/run\"]}", "the field a.1"),
+            ("{\"/mnt/of-ann/run\": 1}", "the field (a name of a field)"),
+            ("a,b\n1,/mnt/of-ann/run\n", "line 2"),
+        ] {
+            assert!(redactor.find_leak(content).is_some(), "{content}");
+            assert_eq!(leak_place(content.as_bytes(), &redactor), expected);
+        }
     }
 }

@@ -6,11 +6,13 @@ use std::time::Duration;
 
 use hyper::body::{Body as _, Incoming};
 use hyper::{HeaderMap, Method, Request, StatusCode, Uri, header};
+use tokio::sync::OwnedSemaphorePermit;
 
 use super::completion::RequestFault;
+use super::memory::MemoryBound;
 
 /// Maximum size of a request body, in bytes (chosen).
-const MAX_BODY: usize = 64 << 20;
+pub(super) const MAX_BODY: usize = 64 << 20;
 /// Maximum time for receiving the body of a request (chosen).
 const BODY_TIMEOUT: Duration = Duration::from_mins(1);
 /// Host names of the loopback interface.
@@ -52,15 +54,20 @@ pub(super) fn admit(request: &Request<Incoming>, port: u16) -> Result<(), Reques
     Ok(())
 }
 
-/// The body of a request.
+/// The body of a request, with its share of the bytes that all bodies may have together.
 ///
 /// # Errors
-/// If it is too large, does not arrive in time, or breaks off.
-pub(super) async fn body(body: Incoming) -> Result<Vec<u8>, RequestFault> {
-    // Check the announced length first.
+/// If it is too large, does not arrive in time, or breaks off; 503 if other bodies have all bytes.
+pub(super) async fn body(
+    body: Incoming,
+    bodies: &MemoryBound,
+) -> Result<(Vec<u8>, OwnedSemaphorePermit), RequestFault> {
+    // Check the announced length first. A body without one may be as long as allowed.
     if body.size_hint().lower() > MAX_BODY as u64 {
         return Err(too_large());
     }
+    let length = body.size_hint().exact().map_or(MAX_BODY, |n| n as usize);
+    let share = bodies.take(length).await?;
     tokio::time::timeout(BODY_TIMEOUT, read_all(body))
         .await
         .map_err(|_| {
@@ -71,6 +78,7 @@ pub(super) async fn body(body: Incoming) -> Result<Vec<u8>, RequestFault> {
             RequestFault::new(StatusCode::REQUEST_TIMEOUT, message)
         })?
         .ok_or_else(too_large)
+        .map(|bytes| (bytes, share))
 }
 
 fn too_large() -> RequestFault {
@@ -83,7 +91,8 @@ fn too_large() -> RequestFault {
 
 /// All bytes of a body; `None` if it is too large or breaks off.
 async fn read_all(mut body: Incoming) -> Option<Vec<u8>> {
-    let mut bytes = Vec::new();
+    let announced = body.size_hint().exact().unwrap_or_default() as usize;
+    let mut bytes = Vec::with_capacity(announced.min(MAX_BODY));
     while let Some(frame) = poll_fn(|context| Pin::new(&mut body).poll_frame(context)).await {
         // A frame without data contains trailers, which are ignored.
         let data = frame.ok()?.into_data().unwrap_or_default();

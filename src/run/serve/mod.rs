@@ -8,6 +8,7 @@ mod admission;
 mod completion;
 mod connections;
 mod frame_matcher;
+mod memory;
 mod parsed_question;
 mod request;
 
@@ -36,11 +37,17 @@ use crate::types::manifests::Status;
 use crate::types::{Choices, Decides, Digest, Family, FrameId, Question, QuestionId};
 use darkqa_questions::rules::Rules;
 
-use admission::{admit, body};
+use admission::{MAX_BODY, admit, body};
 use completion::{Completion, RequestFault};
 use frame_matcher::FrameMatcher;
+use memory::MemoryBound;
 use parsed_question::ParsedQuestion;
 use request::ServedQuestion;
+
+/// Maximum number of bytes of all bodies in flight (chosen). A body takes up to three times its size until it is decoded.
+const MAX_BODIES: usize = 2 * MAX_BODY;
+/// Maximum number of pixels of an image, and of all images in flight (chosen). Decoded and encoded again, a pixel takes 10 to 20 bytes.
+const MAX_PIXELS: usize = 32_000_000;
 
 /// Maximum number of requests answered in parallel; further ones wait (chosen).
 const MAX_PARALLEL: usize = 16;
@@ -73,6 +80,10 @@ struct ServerState {
     models: [(&'static str, Model); 2],
     /// Permits for answering requests.
     permits: Semaphore,
+    /// Bytes of bodies in flight.
+    bodies: MemoryBound,
+    /// Pixels of decoded images in flight.
+    pixels: MemoryBound,
     /// True after the first image that shows no frame.
     has_seen_unknown: AtomicBool,
 }
@@ -105,6 +116,19 @@ pub(crate) fn serve(args: &ServeArgs, progress: &Progress) -> Result<Outcome> {
         frame_matcher: FrameMatcher::new(&dataset, progress)?,
         models,
         permits: Semaphore::new(MAX_PARALLEL),
+        bodies: MemoryBound::new(
+            MAX_BODIES >> 10,
+            1 << 10,
+            format!("bodies of more than {} MiB", MAX_BODIES >> 20),
+        ),
+        pixels: MemoryBound::new(
+            MAX_PIXELS / 1000,
+            1000,
+            format!(
+                "images of more than {} million pixels",
+                MAX_PIXELS / 1_000_000
+            ),
+        ),
         has_seen_unknown: AtomicBool::new(false),
     });
     let runtime = runtime::Builder::new_multi_thread()
@@ -152,7 +176,9 @@ async fn listen(listener: TcpListener, state: Arc<ServerState>, progress: &Progr
         }
     });
     let mut interrupt = Interrupt::listen()?;
-    connections::answer_until(listener, service, interrupt.next()).await;
+    // Dropped after the first interrupt, so that a second one ends the process at once.
+    let interrupted = async move { interrupt.next().await };
+    connections::answer_until(listener, service, interrupted).await;
     Ok(())
 }
 
@@ -167,9 +193,9 @@ async fn respond(
         (&Method::GET | &Method::HEAD, MODELS) => Ok(completion::models(state.names())),
         (&Method::POST, COMPLETIONS) => {
             // Read the body before taking a permit, so that a slow client does not block others.
-            let body = body(request.into_body()).await?;
+            let (body, _share) = body(request.into_body(), &state.bodies).await?;
             let _permit = state.permits.acquire().await;
-            Ok(state.answer(&body).await?.into())
+            Ok(state.answer(body).await?.into())
         }
         (_, path) => {
             let status = match path {
@@ -187,8 +213,8 @@ impl ServerState {
         self.models.iter().map(|(name, _)| *name)
     }
 
-    async fn answer(&self, body: &[u8]) -> Result<Completion, RequestFault> {
-        let request = ServedQuestion::parse(body)?;
+    async fn answer(&self, body: Vec<u8>) -> Result<Completion, RequestFault> {
+        let request = ServedQuestion::parse(body, &self.pixels).await?;
         let model = self.models.iter().find(|(name, _)| *name == request.model);
         let (_, model) = model.ok_or_else(|| {
             let names: Vec<&str> = self.names().collect();
@@ -203,7 +229,7 @@ impl ServerState {
         let frame = request
             .image
             .as_ref()
-            .and_then(|(image, _)| self.frame_matcher.best_match(image));
+            .and_then(|image| self.frame_matcher.best_match(&image.rgb));
         if request.image.is_some() && frame.is_none() && !self.has_seen_unknown.swap(true, Relaxed)
         {
             tracing::warn!(
@@ -212,7 +238,7 @@ impl ServerState {
             );
         }
         let text_digest = Digest::from_bytes(request.text.as_bytes()).to_string();
-        let image = request.image.as_ref().map(|(_, payload)| payload);
+        let image = request.image.as_ref().map(|image| &image.payload);
         let images = image.map(std::slice::from_ref);
         let image_digest = image.map_or_else(String::new, |image| image.facts().digest.to_string());
         let question = Question {

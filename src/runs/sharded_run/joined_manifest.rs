@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::coverage::Coverage;
 use super::stored_shard::{StoredShard, no_shard_error};
 use crate::error::{Error, Result};
+use crate::runs::divisions::remove_tasks_setting;
 use crate::runs::shard_budget::ShardBudget;
 use crate::types::InputSummary;
 use crate::types::flags::setting_spelling;
@@ -53,6 +54,7 @@ pub(super) fn joined_manifest(parts: &[StoredShard], coverage: &Coverage) -> Res
     manifest.shard = None;
     manifest.part = None;
     ShardBudget::remove_note(&mut manifest);
+    remove_tasks_setting(&mut manifest);
     for part in parts {
         for (column, values) in &part.manifest.columns {
             let all = manifest.columns.entry(column.clone()).or_default();

@@ -254,6 +254,40 @@ fn endless_or_nested_bodies_are_refused() {
 }
 
 #[test]
+fn large_images_and_many_values_are_refused() {
+    let bench = Bench::new();
+    let server = Server::start(&bench);
+    let ask = |width: u32, height: u32| {
+        let mut file = std::io::Cursor::new(Vec::new());
+        image::GrayImage::new(width, height)
+            .write_to(&mut file, image::ImageFormat::Png)
+            .unwrap();
+        let data = base64::Engine::encode(
+            &base64::engine::general_purpose::STANDARD,
+            file.into_inner(),
+        );
+        server.ask(&json!({"model": "darkqa-observer", "messages": [{"role": "user", "content": [
+            {"type": "text", "text": "Is it dark?\nA. yes\nB. no"},
+            {"type": "image_url", "image_url": {"url": format!("data:image/png;base64,{data}")}},
+        ]}]}))
+    };
+    let (status, body) = ask(8001, 4000);
+    assert_eq!(status, 413, "{body}");
+    let message = body["error"]["message"].as_str().unwrap();
+    assert!(
+        message.contains("8001 × 4000 pixels; at most 32 million"),
+        "{message}"
+    );
+    let parts = vec![json!({"type": "text", "text": ""}); 100_000];
+    let many =
+        json!({"model": "darkqa-observer", "messages": [{"role": "user", "content": parts}]});
+    let (status, body) = server.ask(&many);
+    assert_eq!(status, 413, "{body}");
+    let (status, body) = ask(400, 300);
+    assert_eq!(status, 200, "{body}");
+}
+
+#[test]
 fn idle_connections_block_no_one() {
     let bench = Bench::new();
     let server = Server::start(&bench);

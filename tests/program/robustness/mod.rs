@@ -5,5 +5,6 @@ mod hostile;
 mod machine_faults;
 mod mutations;
 mod open_files;
+mod signals;
 mod strange_runs;
 mod strange_texts;

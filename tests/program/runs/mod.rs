@@ -9,5 +9,7 @@ mod pins;
 mod plan;
 mod remedies;
 mod shards;
+#[cfg(unix)]
+mod slurm_jobs;
 mod walks;
 mod walks_in_parts;
