@@ -5,6 +5,7 @@ mod cmyk_tiff;
 mod exr_layers;
 mod facts;
 pub mod format;
+mod huffman_tables;
 mod jpeg_markers;
 mod png_chunks;
 mod tiff_tags;
@@ -21,6 +22,7 @@ use image::{ColorType, DynamicImage, ImageDecoder, ImageReader, Limits, RgbImage
 use self::exr_layers::ExrFile;
 use self::facts::{Depth, FileFacts, InkForm, fault};
 use self::format::FileFormat;
+use self::huffman_tables::with_standard_tables;
 use super::colour::{CodeDepth, ColourSpace, ColourTag, Inks, Meaning};
 use super::decode_rule::{ColourRule, DecodeRule, Transfer};
 use darkqa_ground::error::{Error, Result};
@@ -321,7 +323,9 @@ impl ImageFile {
         let colours = self.ink_colours().map_err(|problem| self.error(problem))?;
         let inks = guarded(|| match form {
             InkForm::Tiff => cmyk_tiff::inks(&self.bytes, width as usize * height as usize),
-            InkForm::Plain | InkForm::Adobe => cmyk_jpeg::inks(&self.bytes, form == InkForm::Adobe),
+            InkForm::Plain | InkForm::Adobe => {
+                cmyk_jpeg::inks(&with_standard_tables(&self.bytes), form == InkForm::Adobe)
+            }
         })
         .map_err(|problem| self.error(problem))?;
         let image = RgbImage::from_raw(width, height, colours.srgb(&inks))
@@ -404,6 +408,7 @@ impl ImageFile {
         }
         let bytes = match format {
             FileFormat::Png => png_chunks::without_metadata(&self.bytes),
+            FileFormat::Jpeg => with_standard_tables(&self.bytes),
             _ => Cow::Borrowed(&*self.bytes),
         };
         let mut reader = ImageReader::new(Cursor::new(bytes));
