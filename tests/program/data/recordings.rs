@@ -5,6 +5,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
+use crate::support::image_files::{chunk, with_chunks};
 use crate::support::recording::{Compression, Records, SIZE, compressed, drive, image, picture};
 use crate::support::run::{Bench, Called};
 use crate::support::snapshot::redacted;
@@ -378,6 +379,80 @@ fn sixteen_bit_codes_are_scaled() {
     assert_eq!(third(), [4095; 3]);
     let scaled = import(&bench, "--out out --force --white 4095").ended(0);
     assert_eq!((third(), &*scaled.stderr), ([65535; 3], ""));
+}
+
+/// A PNG of `compressed_image_transport`: the same code in 2 × 2 pixels of a number type.
+fn png_of<P: image::Pixel + image::PixelWithColorType>(pixel: P) -> Vec<u8>
+where
+    [P::Subpixel]: image::EncodableLayout,
+{
+    let mut file = std::io::Cursor::new(Vec::new());
+    image::ImageBuffer::from_pixel(2, 2, pixel)
+        .write_to(&mut file, image::ImageFormat::Png)
+        .unwrap();
+    file.into_inner()
+}
+
+#[test]
+fn white_applies_to_compressed_images_of_16_bits() {
+    for (format, file) in [
+        (
+            "mono16; png compressed mono16",
+            png_of(image::Luma([2048_u16])),
+        ),
+        (
+            "rgb16; png compressed rgb16",
+            png_of(image::Rgb([2048_u16; 3])),
+        ),
+    ] {
+        let mut records = Records::default();
+        records.topic(1, "/c", "sensor_msgs/msg/CompressedImage", "cdr", "");
+        records.message(1, 0.0, &compressed(0.0, format, &file));
+        let bench = with_recording(records.file());
+        let path = bench.path("out/scenes/drive-0000/rgb/000000.png");
+        let dark = import(&bench, "--out out").ended(0);
+        assert!(dark.stderr.contains("is 2048: they are dark"), "{dark:?}");
+        assert!(dark.stderr.contains("set --white 4095"), "{dark:?}");
+        assert_eq!(fs::read(&path).unwrap(), file);
+        // Choosing frames by their change reads the images, too.
+        let line = "--out out --force --white 4095 --changed 5";
+        let called = import(&bench, line).ended(0);
+        assert!(!called.stderr.contains("--white"), "{called:?}");
+        let scaled = image::open(&path).unwrap().into_rgb16();
+        assert_eq!(scaled[(1, 1)].0, [(2048 * 65_535_u32 / 4095 + 1) as u16; 3]);
+    }
+}
+
+#[test]
+fn white_does_not_change_compressed_images_of_8_bits() {
+    let file = png_of(image::Rgb([200_u8; 3]));
+    let mut records = Records::default();
+    records.topic(1, "/c", "sensor_msgs/msg/CompressedImage", "cdr", "");
+    records.message(1, 0.0, &compressed(0.0, "rgb8; png compressed bgr8", &file));
+    let bench = with_recording(records.file());
+    let called = import(&bench, "--out out --white 4095").ended(0);
+    assert_eq!(called.stderr, "");
+    let path = bench.path("out/scenes/drive-0000/rgb/000000.png");
+    assert_eq!(fs::read(path).unwrap(), file);
+}
+
+/// Linear light has its white already.
+#[test]
+fn white_is_refused_for_files_that_state_their_codes() {
+    let gamma = chunk(*b"gAMA", &100_000_u32.to_be_bytes());
+    let file = with_chunks(&png_of(image::Rgb([2048_u16; 3])), &[gamma]);
+    let mut records = Records::default();
+    records.topic(1, "/c", "sensor_msgs/msg/CompressedImage", "cdr", "");
+    records.message(1, 0.0, &compressed(0.0, "png", &file));
+    let bench = with_recording(records.file());
+    let called = import(&bench, "--out out --white 4095").ended(2);
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 2
+    ERROR drive: /c at [TIME]: the file states what its codes mean, so --white does not apply; leave it out, or
+        take the topic alone
+    error: drive.mcap: no frame of it could be taken
+    ");
+    import(&bench, "--out out").ended(0);
 }
 
 #[test]
