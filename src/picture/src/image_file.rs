@@ -174,10 +174,7 @@ impl ImageFile {
             return self.ink_colours().ok().map(|inks| inks.note());
         }
         match (self.rule.colour, colour.meaning(depth.code_depth())) {
-            (ColourRule::Convert, Err(_) | Ok(Meaning::Linear)) | (_, Ok(Meaning::Srgb)) => None,
-            (ColourRule::Convert, Ok(Meaning::Other(space))) => {
-                Some(space.note(ColourHandling::Converted))
-            }
+            (_, Ok(Meaning::Srgb)) => None,
             (ColourRule::Ignore, Ok(Meaning::Other(space))) => {
                 Some(space.note(ColourHandling::Ignored))
             }
@@ -186,6 +183,12 @@ impl ImageFile {
                 profile: None,
                 handling: ColourHandling::Ignored,
             }),
+            (_, Err(_) | Ok(Meaning::Linear)) => None,
+            (rule, Ok(Meaning::Other(space))) => {
+                let is_refused =
+                    rule == ColourRule::Convert && space.handling == ColourHandling::Clipped;
+                (!is_refused).then(|| space.note(space.handling))
+            }
         }
     }
 
@@ -202,14 +205,22 @@ impl ImageFile {
         }
         let meaning = match colour {
             ColourRule::Ignore => Meaning::Srgb,
-            ColourRule::Convert => facts.colour.meaning(facts.depth.code_depth())?,
+            ColourRule::Convert | ColourRule::Clip => {
+                facts.colour.meaning(facts.depth.code_depth())?
+            }
         };
+        if let Meaning::Other(space) = &meaning
+            && space.handling == ColourHandling::Clipped
+            && colour == ColourRule::Convert
+        {
+            return Err(space.hdr_refusal());
+        }
         let is_linear = transfer == Transfer::Linear && facts.depth == Depth::Sixteen;
         Ok(match (meaning, facts.depth) {
             (Meaning::Linear, _) | (Meaning::Srgb, Depth::Float) => Interpretation::Light(None),
             (Meaning::Other(space), Depth::Float) => Interpretation::Light(Some(space)),
             (Meaning::Srgb, _) if is_linear => {
-                if colour == ColourRule::Convert && facts.colour != ColourTag::None {
+                if colour != ColourRule::Ignore && facts.colour != ColourTag::None {
                     return Err(contradiction(&facts.colour));
                 }
                 Interpretation::Light(None)

@@ -1,14 +1,12 @@
-//! `import mcap`, `import rosbag` and `import video`: frames of recordings that the tests write.
+//! `import mcap` and `import rosbag`: frames of recordings that the tests write.
 
 use std::fs;
-use std::path::Path;
 
 use serde_json::Value;
 
 use crate::support::image_files::{chunk, with_chunks};
 use crate::support::recording::{Compression, Records, SIZE, compressed, drive, image, picture};
 use crate::support::run::{Bench, Called};
-use crate::support::snapshot::redacted;
 
 /// A folder with the recording `drive.mcap`.
 fn with_recording(file: impl AsRef<[u8]>) -> Bench {
@@ -534,120 +532,5 @@ fn ros_1_bag_names_its_conversion() {
       pip install rosbags
       rosbags-convert --src 'my drive.bag' --dst 'my drive' --dst-storage mcap
       darkqa-eval import mcap 'my drive'
-    ");
-}
-
-/// A program `ffmpeg` that writes four images, half a second apart, as ffmpeg does.
-#[cfg(unix)]
-fn with_ffmpeg(bench: &Bench, end: &str) {
-    use std::os::unix::fs::PermissionsExt as _;
-
-    let script = format!(
-        r#"#!/bin/sh
-echo "$@" >> {calls}
-echo 'ffmpeg version 5.1.6 Copyright' >&2
-echo '  Duration: 00:00:02.00, start: 0.000000, bitrate: 9 kb/s' >&2
-echo '  Stream #0:0: Video: h264 (High), yuv420p, 4x2, 2 fps' >&2
-case "$*" in *image2pipe*) ;; *) exit 1;; esac
-echo '[Parsed_showinfo_1 @ 0x1] config in time_base: 1/10, frame_rate: 1/1' >&2
-for i in 0 1 2 3; do
-  echo "[Parsed_showinfo_1 @ 0x1] n: $i pts: $((10 * i + 5)) pts_time:$i.5 duration: 1" >&2
-  printf 'P6\n4 2\n255\nabcdefghijklmnopqrstuvw%s' $i
-done
-{end}
-"#,
-        calls = bench.path("calls").display()
-    );
-    let path = bench.file("bin/ffmpeg", script);
-    fs::set_permissions(path, fs::Permissions::from_mode(0o755)).unwrap();
-}
-
-#[cfg(unix)]
-fn import_video(bench: &Bench, line: &str, path: &Path) -> Called {
-    let words: Vec<&str> = line.split_whitespace().collect();
-    let mut command = bench.command(&[&["import", "video", "drive.mp4"], &words[..]].concat());
-    let system = std::env::var("PATH").unwrap_or_default();
-    let path = format!("{}:{system}", path.display());
-    crate::support::run::called(command.env("PATH", path))
-}
-
-#[cfg(unix)]
-#[test]
-fn frames_of_video_come_from_ffmpeg() {
-    let bench = Bench::new();
-    bench.file("drive.mp4", b"x");
-    with_ffmpeg(&bench, "exit 0");
-    let described = import_video(&bench, "", &bench.path("bin")).ended(0);
-    assert_eq!(described.stdout, "h264 (High), yuv420p, 4x2, 2 fps; 2 s\n");
-    let called = import_video(
-        &bench,
-        "--every 1 --stretch 2 --out out",
-        &bench.path("bin"),
-    )
-    .ended(0);
-    insta::assert_snapshot!(called, @"
-    exit code: 0
-    stdout:
-    out: 4 frames of 2 scenes ([TIME] each)
-    video: h264 (High), yuv420p, 4x2, 2 fps; one every [TIME]
-    ");
-    assert_eq!(frames(&bench)[3]["t"], 3.5);
-    let image = image::open(bench.path("out/scenes/drive-0001/rgb/000003.png"))
-        .unwrap()
-        .into_rgb8();
-    assert_eq!(
-        (image.dimensions(), image[(0, 0)].0, image[(3, 1)].0),
-        ((4, 2), *b"abc", *b"vw3")
-    );
-    let calls = fs::read_to_string(bench.path("calls")).unwrap();
-    insta::assert_snapshot!(redacted(&calls), @"
-    -nostdin -nostats -protocol_whitelist file,pipe -i file:drive.mp4
-    -nostdin -nostats -protocol_whitelist file,pipe -i file:drive.mp4
-    -nostdin -nostats -protocol_whitelist file,pipe -i file:drive.mp4 -map 0:v:0 -vf
-        select='isnan(prev_selected_t)+gt(floor((t-start_t)/1+1e-7),floor((prev_selected_t-start_t)/1+1e-7))',showinfo
-        -fps_mode passthrough -pix_fmt rgb24 -c:v ppm -f image2pipe -
-    ");
-}
-
-#[cfg(unix)]
-#[test]
-fn a_broken_video_gives_its_frames() {
-    let bench = Bench::new();
-    bench.file("drive.mp4", b"x");
-    with_ffmpeg(&bench, "echo 'moov atom not found' >&2; exit 1");
-    let called = import_video(&bench, "--every 0 --out out", &bench.path("bin")).ended(1);
-    insta::assert_snapshot!(called.messages(), @"
-    exit code: 1
-     WARN drive.mp4: ffmpeg: it ends with an error; Stream #0:0: Video: h264 (High), yuv420p, 4x2, 2 fps; moov
-        atom not found; frames up to there are kept
-    ");
-    assert_eq!(frames(&bench).len(), 4);
-}
-
-#[cfg(unix)]
-#[test]
-fn damage_that_ffmpeg_reports_is_named() {
-    let bench = Bench::new();
-    bench.file("drive.mp4", b"x");
-    with_ffmpeg(&bench, "echo 'error while decoding MB 3 5' >&2; exit 0");
-    let called = import_video(&bench, "--every 0 --out out", &bench.path("bin")).ended(1);
-    insta::assert_snapshot!(called.messages(), @"
-    exit code: 1
-     WARN drive.mp4: ffmpeg reports a problem: error while decoding MB 3 5; its frames are kept
-    ");
-    assert_eq!(frames(&bench).len(), 4);
-}
-
-#[cfg(unix)]
-#[test]
-fn without_ffmpeg_the_remedy_is_named() {
-    let bench = Bench::new();
-    bench.file("drive.mp4", b"x");
-    let mut command = bench.command(&["import", "video", "drive.mp4", "--out", "out"]);
-    let called = crate::support::run::called(command.env("PATH", bench.path("empty"))).ended(2);
-    insta::assert_snapshot!(called.messages(), @"
-    exit code: 2
-    error: ffmpeg: not found on PATH; videos are decoded by it: install it (apt install ffmpeg, brew install
-        ffmpeg), or give the folder of extracted images to --data
     ");
 }
