@@ -94,7 +94,8 @@ pub(crate) struct DecodeArgs {
     /// The maximum size of an image.
     #[command(flatten)]
     pub limit: PixelLimit,
-    /// Treatment of images whose file states other colours than sRGB (an ICC profile, cICP, gAMA)
+    /// Treatment of images whose file states other colours than sRGB (an ICC profile, cICP, gAMA); clip also converts HDR, where light
+    /// above 203 cd/m² becomes white
     #[arg(long, value_enum, default_value_t, add = Decides::Pixels)]
     pub colour: ColourRule,
     /// Encoding of the samples of 16-bit PNG and TIFF images; OpenEXR images are always linear light, 8-bit images never

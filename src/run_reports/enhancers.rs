@@ -73,6 +73,9 @@ pub(super) fn enhancer_alerts(runs: &[JoinedRun]) -> Vec<Alert> {
                 "Images were resized for {name}, so its results are not those of the model at their own size."
             ));
         }
+        if let Some(images) = burnt_out(note) {
+            add(format!("{name}: {images}."));
+        }
         let JudgedImages { images, .. } = note.judged;
         if note.judged.flaws() > 0 && probe.is_none_or(|probe| probe.problem.is_none()) {
             add(format!(
@@ -174,6 +177,27 @@ fn looks(note: &EnhancerNote) -> String {
             flaws(judged)
         ),
     }
+}
+
+/// The burnt-out images of each condition; `None` without any.
+fn burnt_out(note: &EnhancerNote) -> Option<String> {
+    let (first, images) = note.burnt_out.first_key_value()?;
+    let example = &images.example;
+    let parts: Vec<String> = note
+        .burnt_out
+        .iter()
+        .map(|(condition, found)| {
+            format!(
+                "{} at {condition} (on average {} % of the pixels)",
+                found.images,
+                found.percents / found.images.max(1)
+            )
+        })
+        .collect();
+    Some(format!(
+        "images are burnt out, with codes of 254 or 255 where the dark ones have detail: {}; for example {example} at {first}",
+        parts.join(", ")
+    ))
 }
 
 /// The number of images with each flaw, and a few examples.

@@ -13,6 +13,7 @@ mod channel;
 mod chunk;
 mod encoding;
 mod exposure;
+mod ffmpeg_colours;
 mod fields;
 mod image_message;
 mod mcap;

@@ -8,7 +8,9 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::{self, JoinHandle};
 
 use super::Nanoseconds;
+use super::ffmpeg_colours::{FrameColours, needs_colours};
 use crate::error::{Error, Result};
+use crate::picture::FrameConversion;
 use crate::picture::decode_rule::MAX_PIXELS;
 use crate::types::Rgb;
 use crate::types::text::excerpt;
@@ -26,6 +28,8 @@ pub(crate) struct Video {
     pub(crate) stream: String,
     /// Option of the installed version to output every frame once.
     passthrough: [&'static str; 2],
+    /// True if the pictures are only for displays with Dolby Vision.
+    is_dolby_vision: bool,
 }
 
 /// Frame of a video.
@@ -33,7 +37,25 @@ pub(crate) struct Video {
 pub(crate) struct VideoFrame {
     /// Time from the start of the video.
     pub(crate) time: Nanoseconds,
+    /// Image in sRGB.
     pub(crate) image: Rgb,
+}
+
+/// Facts about a frame in the log of ffmpeg.
+#[derive(Debug)]
+struct FrameFacts {
+    time: Nanoseconds,
+    /// `None` if this version of ffmpeg does not state them.
+    colours: Option<FrameColours>,
+}
+
+/// Conversion of the frames of a video to sRGB.
+#[derive(Debug)]
+struct Conversion {
+    conversion: FrameConversion,
+    /// Number of pixels so far, and of those with light above white.
+    pixels: usize,
+    clipped: usize,
 }
 
 /// Running decoder of a video. Dropping it stops ffmpeg.
@@ -42,8 +64,14 @@ pub(crate) struct VideoFrames {
     path: PathBuf,
     child: Child,
     output: BufReader<ChildStdout>,
-    times: Receiver<Nanoseconds>,
+    facts: Receiver<FrameFacts>,
     log: Option<JoinHandle<FfmpegLog>>,
+    /// `None` if the codes are taken as sRGB codes.
+    conversion: Option<Conversion>,
+    /// Colours of the last frame.
+    colours: Option<FrameColours>,
+    /// The first frame, which was read to learn the colours.
+    first: Option<Result<Option<VideoFrame>>>,
 }
 
 /// Log of ffmpeg.
@@ -108,14 +136,47 @@ impl Video {
             } else {
                 ["-vsync", "passthrough"]
             },
+            is_dolby_vision: log
+                .lines()
+                .any(|line| line.contains("DOVI") && line.contains("compatibility id: 0")),
         })
     }
 
-    /// Decodes one frame every `interval` seconds from the first one, or every frame if it is 0.
+    /// Decodes one frame every `interval` seconds from the first one, or every frame if it is 0. Frames are converted to sRGB as the video
+    /// states its colours: codes of BT.709 and similar ones are kept, wide primaries and HDR are converted.
     ///
     /// # Errors
-    /// If ffmpeg cannot be started.
+    /// If ffmpeg cannot be started, or the colours of the video are not converted.
     pub(crate) fn frames(&self, interval: f64) -> Result<VideoFrames> {
+        let error = |problem: String| Error::data(self.path.display(), problem);
+        if self.is_dolby_vision {
+            let problem = "the pictures are only for displays with Dolby Vision; export the video for other displays (HDR10, HLG or SDR) first";
+            return Err(error(problem.to_owned()));
+        }
+        let mut frames = self.decode(interval, None)?;
+        let first = frames.next();
+        let conversion = match &frames.colours {
+            Some(colours) => colours.conversion(&self.path).map_err(error)?,
+            None if needs_colours(&self.stream) && matches!(first, Ok(Some(_))) => {
+                let problem = "this ffmpeg does not state the colours of frames, which are not sRGB; version 4.3 or later expected";
+                return Err(error(problem.to_owned()));
+            }
+            None => None,
+        };
+        match conversion {
+            Some(conversion) => {
+                drop(frames);
+                self.decode(interval, Some(conversion))
+            }
+            None => {
+                frames.first = Some(first);
+                Ok(frames)
+            }
+        }
+    }
+
+    /// Starts ffmpeg. Frames that are converted are decoded to 16 bits.
+    fn decode(&self, interval: f64, conversion: Option<FrameConversion>) -> Result<VideoFrames> {
         let filter = if interval > 0.0 {
             // The small addend is for frames at a multiple of the interval, whose quotient may be rounded down.
             let [this, last] = ["t", "prev_selected_t"]
@@ -128,7 +189,15 @@ impl Video {
         command
             .args(["-map", "0:v:0", "-vf", &filter])
             .args(self.passthrough)
-            .args(["-pix_fmt", "rgb24", "-c:v", "ppm", "-f", "image2pipe", "-"])
+            .args([
+                "-pix_fmt",
+                if conversion.is_some() {
+                    "rgb48be"
+                } else {
+                    "rgb24"
+                },
+            ])
+            .args(["-c:v", "ppm", "-f", "image2pipe", "-"])
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped());
@@ -136,22 +205,46 @@ impl Video {
         let (Some(output), Some(log)) = (child.stdout.take(), child.stderr.take()) else {
             return Err(start_error(&ErrorKind::BrokenPipe.into()));
         };
-        let (sender, times) = channel();
+        let (sender, facts) = channel();
         let log = thread::spawn(move || read_log(log, &sender));
         Ok(VideoFrames {
             path: self.path.clone(),
             child,
             output: BufReader::with_capacity(1 << 20, output),
-            times,
+            facts,
             log: Some(log),
+            conversion: conversion.map(Conversion::new),
+            colours: None,
+            first: None,
         })
     }
 }
 
-/// Reads the log of a running ffmpeg, and sends the times of the frames.
-fn read_log(log: ChildStderr, times: &Sender<Nanoseconds>) -> FfmpegLog {
+impl Conversion {
+    fn new(conversion: FrameConversion) -> Self {
+        Self {
+            conversion,
+            pixels: 0,
+            clipped: 0,
+        }
+    }
+
+    fn convert(&mut self, samples: &[u16]) -> Vec<u8> {
+        let (converted, clipped) = self.conversion.convert(samples);
+        self.pixels += samples.len() / 3;
+        self.clipped += clipped;
+        converted
+    }
+}
+
+/// Reads the log of a running ffmpeg, and sends the facts about the frames.
+fn read_log(log: ChildStderr, facts: &Sender<FrameFacts>) -> FfmpegLog {
     let mut kept = FfmpegLog::default();
     let mut base = None;
+    // The colours of a frame are on a later line than its time.
+    let mut waiting: Option<FrameFacts> = None;
+    // Sending fails if the rest of the video is not needed.
+    let send = |found: Option<FrameFacts>| drop(found.map(|found| facts.send(found)));
     let mut lines = BufReader::new(log);
     let mut line = Vec::new();
     // Lines are read as bytes, because names in a file need not be UTF-8.
@@ -161,14 +254,20 @@ fn read_log(log: ChildStderr, times: &Sender<Nanoseconds>) -> FfmpegLog {
     {
         let text = String::from_utf8_lossy(&line);
         base = parse_time_base(&text).or(base);
-        match base.and_then(|base| parse_frame_time(&text, base)) {
-            // Sending fails if the rest of the video is not needed.
-            Some(time) => drop(times.send(time)),
-            None if text.contains("showinfo") => {}
-            None => kept.add(text.trim_end()),
+        if let Some(time) = base.and_then(|base| parse_frame_time(&text, base)) {
+            let colours = None;
+            send(waiting.replace(FrameFacts { time, colours }));
+        } else if let Some(colours) = FrameColours::parse(&text) {
+            send(waiting.take().map(|found| FrameFacts {
+                colours: Some(colours),
+                ..found
+            }));
+        } else if !text.contains("showinfo") {
+            kept.add(text.trim_end());
         }
         line.clear();
     }
+    send(waiting);
     kept
 }
 
@@ -249,14 +348,20 @@ impl VideoFrames {
     /// Reads the next frame; `None` at the end.
     ///
     /// # Errors
-    /// If ffmpeg fails, or its output is not an image.
+    /// If ffmpeg fails, its output is not an image, or the colours change.
     pub(crate) fn next(&mut self) -> Result<Option<VideoFrame>> {
+        if let Some(first) = self.first.take() {
+            return first;
+        }
         match self.read_image() {
             Ok(Some(image)) => {
-                let time = self
-                    .times
+                let facts = self
+                    .facts
                     .recv()
                     .map_err(|_| self.failure("it states no time of a frame"))?;
+                self.check_colours(&facts)?;
+                self.colours = facts.colours;
+                let time = facts.time;
                 Ok(Some(VideoFrame { time, image }))
             }
             Ok(None) => {
@@ -270,6 +375,48 @@ impl VideoFrames {
         }
     }
 
+    /// Checks that a frame needs the same conversion as the frames before it.
+    fn check_colours(&mut self, facts: &FrameFacts) -> Result<()> {
+        let (Some(before), Some(found)) = (&self.colours, &facts.colours) else {
+            return Ok(());
+        };
+        if before == found {
+            return Ok(());
+        }
+        let name = |conversion: Option<&FrameConversion>| {
+            conversion
+                .map_or("sRGB codes", FrameConversion::name)
+                .to_owned()
+        };
+        let expected = name(self.conversion.as_ref().map(|known| &known.conversion));
+        let found = match found.conversion(&self.path) {
+            Ok(conversion) => name(conversion.as_ref()),
+            Err(problem) => problem,
+        };
+        if found == expected {
+            return Ok(());
+        }
+        let at = super::seconds(facts.time);
+        let problem = format!("the colours change at {at:.3} s: {expected}, then {found}");
+        Err(self.failure(&problem))
+    }
+
+    /// Name of the colours that are converted to sRGB; `None` if the codes are taken as sRGB codes.
+    pub(crate) fn converted_from(&self) -> Option<&str> {
+        self.conversion
+            .as_ref()
+            .map(|found| found.conversion.name())
+    }
+
+    /// Share of the pixels so far whose light is above white and was clipped; `None` if the video is not HDR.
+    pub(crate) fn clipped_share(&self) -> Option<f64> {
+        let found = self.conversion.as_ref()?;
+        found
+            .conversion
+            .is_hdr()
+            .then(|| found.clipped as f64 / found.pixels.max(1) as f64)
+    }
+
     /// Reads the next image, in the format PPM.
     fn read_image(&mut self) -> Result<Option<Rgb>, String> {
         let Some(magic) = self.read_word()? else {
@@ -280,14 +427,30 @@ impl VideoFrames {
             self.read_number()?,
             self.read_number()?,
         );
+        let expected = if self.conversion.is_some() {
+            65_535
+        } else {
+            255
+        };
         let pixels = width.saturating_mul(height);
-        if magic != "P6" || max_value != 255 || pixels == 0 || pixels as u64 > MAX_PIXELS {
+        if magic != "P6" || max_value != expected || pixels == 0 || pixels as u64 > MAX_PIXELS {
             return Err(format!("an image {magic} of {width} × {height} pixels"));
         }
-        let mut samples = vec![0; pixels * 3];
-        self.output
-            .read_exact(&mut samples)
-            .map_err(|e| e.to_string())?;
+        let samples = if let Some(conversion) = &mut self.conversion {
+            let mut bytes = vec![0; pixels * 6];
+            self.output
+                .read_exact(&mut bytes)
+                .map_err(|e| e.to_string())?;
+            let pairs = bytes.as_chunks::<2>().0.iter();
+            let samples: Vec<u16> = pairs.map(|pair| u16::from_be_bytes(*pair)).collect();
+            conversion.convert(&samples)
+        } else {
+            let mut samples = vec![0; pixels * 3];
+            self.output
+                .read_exact(&mut samples)
+                .map_err(|e| e.to_string())?;
+            samples
+        };
         Rgb::new(height, width, samples)
             .map(Some)
             .map_err(|e| e.to_string())

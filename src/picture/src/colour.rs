@@ -4,33 +4,34 @@
 //! points (`cICP`), an ICC profile, the chunk `sRGB`, gamma and primaries (`gAMA`, `cHRM`). Without any, codes are sRGB. Other formats have
 //! only profiles.
 
+mod code_points;
 mod conversion;
 mod curve;
 mod icc;
 mod inks;
 pub(super) mod primaries;
+mod space;
 mod srgb;
 
 use std::io::Read as _;
 use std::sync::{Arc, LazyLock};
 
-pub(super) use self::conversion::Conversion;
+pub(super) use self::code_points::CodePoints;
+use self::code_points::primaries_number;
 use self::curve::ToneCurve;
 use self::icc::Profile;
 pub(super) use self::inks::Inks;
 use self::primaries::Primaries;
+pub(super) use self::space::{CodeDepth, ColourSpace, Meaning};
+use self::space::{REMEDY, rgb_space};
 use darkqa_ground::types::values::Recent;
-use darkqa_ground::types::{ColourHandling, ColourNote, Digest};
+use darkqa_ground::types::{ColourHandling, Digest};
 
 /// Maximum size of an ICC profile, in bytes; chosen. Matrix profiles have a few thousand bytes, printer profiles up to a few million.
 const MAX_PROFILE_BYTES: usize = 4 << 20;
 
 /// Number of profiles whose conversions are cached; chosen. The images of a data set usually share one profile.
 const CACHED_PROFILES: usize = 16;
-
-/// Remedy for colours that cannot be converted.
-const REMEDY: &str =
-    "convert it to sRGB first, or take its codes as sRGB with --decode colour=ignore";
 
 /// The colour information of a file; of several, the one with the highest priority.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -60,57 +61,6 @@ pub(super) struct Gamma {
     pub(super) primaries: Option<[u32; 8]>,
 }
 
-/// Interpretation of the codes of an image.
-#[derive(Debug, Clone)]
-pub(super) enum Meaning {
-    Srgb,
-    /// Linear light with the primaries of sRGB.
-    Linear,
-    /// A colour space that can be converted to sRGB.
-    Other(Arc<ColourSpace>),
-}
-
-/// Bit depth of the codes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum CodeDepth {
-    Eight,
-    Sixteen,
-}
-
-/// A colour space other than sRGB.
-#[derive(Debug)]
-pub(super) struct ColourSpace {
-    pub(super) conversion: Conversion,
-    /// Name of the profile or of the standard.
-    name: String,
-    /// Digest of the profile; `None` without a profile.
-    profile: Option<Digest>,
-    /// True for a grey profile.
-    is_grey: bool,
-}
-
-impl ColourSpace {
-    /// Checks that a colour image has no grey profile. `is_grey` tells if the image is grey.
-    pub(super) fn check(&self, is_grey: bool) -> Result<(), String> {
-        if self.is_grey && !is_grey {
-            let name = &self.name;
-            return Err(format!(
-                "the ICC profile {name:?} is for grey, but the image has colours; {REMEDY}"
-            ));
-        }
-        Ok(())
-    }
-
-    /// Note for images with this colour space and handling.
-    pub(super) fn note(&self, handling: ColourHandling) -> ColourNote {
-        ColourNote {
-            from: self.name.clone(),
-            profile: self.profile,
-            handling,
-        }
-    }
-}
-
 impl ColourTag {
     /// Interprets the colour information for codes of this depth.
     ///
@@ -119,9 +69,11 @@ impl ColourTag {
     pub(super) fn meaning(&self, depth: CodeDepth) -> Result<Meaning, String> {
         match self {
             Self::None | Self::Srgb => Ok(Meaning::Srgb),
-            Self::CodePoints(points) => meaning_from_code_points(*points),
-            Self::Profile(profile) => meaning_from_profile(profile),
-            Self::DeflatedProfile(chunk) => meaning_from_profile(&decompress_profile(chunk)?),
+            Self::CodePoints(points) => meaning_from_code_points(*points, depth),
+            Self::Profile(profile) => meaning_from_profile(profile, depth),
+            Self::DeflatedProfile(chunk) => {
+                meaning_from_profile(&decompress_profile(chunk)?, depth)
+            }
             Self::Gamma(gamma) => gamma.meaning(depth),
             Self::Primaries(primaries) => Ok(meaning_from_primaries(primaries)),
         }
@@ -151,50 +103,47 @@ fn meaning_from_primaries(primaries: &Primaries) -> Meaning {
     let [red, green, blue, white] =
         [red, green, blue, white].map(|[x, y]| format!("{x:.4} {y:.4}"));
     let name = format!("primaries {red}, {green}, {blue}, white {white}");
-    rgb_space(name, ToneCurve::Gamma(1.0), primaries)
-}
-
-/// A colour space with the same tone curve for all channels.
-fn rgb_space(name: String, curve: ToneCurve, primaries: &Primaries) -> Meaning {
-    Meaning::Other(Arc::new(ColourSpace {
-        conversion: Conversion::new([curve.clone(), curve.clone(), curve], primaries.to_srgb()),
+    Meaning::Other(Arc::new(rgb_space(
         name,
-        profile: None,
-        is_grey: false,
-    }))
+        ToneCurve::Gamma(1.0),
+        primaries,
+        ColourHandling::Converted,
+    )))
 }
 
-/// Interprets code points of H.273 (tables 2 to 4).
-fn meaning_from_code_points(points: [u8; 4]) -> Result<Meaning, String> {
-    match points {
-        [_, 16, ..] => Err(format!("the codes are PQ (HDR); {REMEDY}")),
-        [_, 18, ..] => Err(format!("the codes are HLG (HDR); {REMEDY}")),
-        [.., 0] => Err(format!(
+/// Interprets code points of H.273: primaries, transfer, matrix, and 1 for the full range.
+fn meaning_from_code_points(points: [u8; 4], depth: CodeDepth) -> Result<Meaning, String> {
+    let [primaries, transfer, matrix, range] = points;
+    if range == 0 {
+        return Err(format!(
             "the codes have the narrow range of video; {REMEDY}"
-        )),
-        [1, 13, 0, 1] => Ok(Meaning::Srgb),
-        [1, 1, 0, 1] => Ok(rgb_space(
-            "BT.709".to_owned(),
-            ToneCurve::Bt709,
-            &Primaries::SRGB,
-        )),
-        [12, 13, 0, 1] => Ok(rgb_space(
-            "Display P3".to_owned(),
-            ToneCurve::Srgb,
-            &Primaries::DISPLAY_P3,
-        )),
-        [primaries, transfer, matrix, range] => Err(format!(
-            "the colours have the code points {primaries}/{transfer}/{matrix}/{range} (cICP); 1/13/0/1 (sRGB), 1/1/0/1 (BT.709) or 12/13/0/1 (Display P3) expected: {REMEDY}"
-        )),
+        ));
     }
+    if matrix != 0 || range != 1 {
+        return Err(format!(
+            "the colours have the code points {primaries}/{transfer}/{matrix}/{range} (cICP); matrix 0 (RGB) and range 1 (full) expected: {REMEDY}"
+        ));
+    }
+    let points = CodePoints {
+        primaries,
+        transfer,
+    };
+    points
+        .meaning(depth)
+        .map_err(|problem| format!("{problem} (cICP {primaries}/{transfer}); {REMEDY}"))
 }
 
 /// Interprets an ICC profile. The most recent profiles are cached by their digests.
-fn meaning_from_profile(profile: &[u8]) -> Result<Meaning, String> {
+///
+/// Of HDR profiles, which convert by tables, the code points are used.
+fn meaning_from_profile(profile: &[u8], depth: CodeDepth) -> Result<Meaning, String> {
     static CACHE: LazyLock<Recent<Digest, Meaning>> =
         LazyLock::new(|| Recent::new(CACHED_PROFILES));
     if profile.len() > MAX_PROFILE_BYTES {
         return Err(profile_too_large());
+    }
+    if let Some(points @ [_, 16 | 18, ..]) = icc::code_points(profile) {
+        return meaning_from_code_points(points, depth);
     }
     let digest = Digest::from_bytes(profile);
     CACHE.get(&digest, || {
@@ -202,6 +151,7 @@ fn meaning_from_profile(profile: &[u8]) -> Result<Meaning, String> {
             name,
             conversion,
             is_grey,
+            is_video,
         } = Profile::read(profile).map_err(|problem| format!("{problem}; {REMEDY}"))?;
         if conversion.is_identity() {
             return Ok(Meaning::Srgb);
@@ -211,6 +161,11 @@ fn meaning_from_profile(profile: &[u8]) -> Result<Meaning, String> {
             name,
             profile: Some(digest),
             is_grey,
+            handling: if is_video {
+                ColourHandling::Video
+            } else {
+                ColourHandling::Converted
+            },
         })))
     })
 }
@@ -246,49 +201,50 @@ fn profile_too_large() -> String {
 }
 
 impl Gamma {
+    /// Exponents with their transfers in H.273: 1/2.2 for sRGB, 1/1.961 for BT.709 as ffmpeg up to version 7 writes it, 1/2.8, and linear
+    /// light.
+    const TRANSFERS: [(u32, u8); 4] = [(Self::SRGB, 13), (50_994, 1), (35_714, 5), (100_000, 8)];
     /// Exponent of the approximation of sRGB, 1/2.2.
     const SRGB: u32 = 45_455;
-    /// Tolerance for exponents that count as sRGB (chosen).
-    const EXPONENT_TOLERANCE: u32 = 50;
-    /// Tolerance for primaries that count as sRGB, because encoders round them differently (chosen).
-    const PRIMARIES_TOLERANCE: u32 = 100;
-
-    /// Exponent of linear light, which is supported only with 16 bits.
-    const LINEAR: u32 = 100_000;
+    /// Tolerance for exponents, because encoders round them differently (chosen).
+    const TOLERANCE: u32 = 50;
 
     fn meaning(self, depth: CodeDepth) -> Result<Meaning, String> {
-        if let Some(primaries) = self.primaries.filter(|found| !Self::are_srgb(*found)) {
-            let [white, red, green, blue] = [0, 2, 4, 6].map(|i| {
-                format!(
-                    "{}, {}",
-                    png_number(primaries[i]),
-                    png_number(primaries[i + 1])
-                )
-            });
-            return Err(format!(
-                "the primaries of the image (cHRM) are not those of sRGB (white {white}, red {red}, green {green}, blue {blue}); {REMEDY}"
-            ));
+        let primaries = match self.primaries {
+            None => 1,
+            Some(stated) => primaries_number(stated).ok_or_else(|| unknown_primaries(stated))?,
+        };
+        let transfer = match self.exponent {
+            // Wide primaries alone are no description: ffmpeg 5.1 writes HLG and PQ so.
+            None => 2,
+            Some(found) => Self::TRANSFERS
+                .iter()
+                .find(|(exponent, _)| found.abs_diff(*exponent) <= Self::TOLERANCE)
+                .map(|(_, transfer)| *transfer)
+                .ok_or_else(|| {
+                    format!(
+                        "the gamma of the image (gAMA) is {}; {} (sRGB) expected: {REMEDY}",
+                        png_number(found),
+                        png_number(Self::SRGB)
+                    )
+                })?,
+        };
+        CodePoints {
+            primaries,
+            transfer,
         }
-        match self.exponent {
-            Some(Self::LINEAR) if depth == CodeDepth::Sixteen => Ok(Meaning::Linear),
-            Some(found) if found.abs_diff(Self::SRGB) > Self::EXPONENT_TOLERANCE => Err(format!(
-                "the gamma of the image (gAMA) is {}; {} (sRGB) expected: {REMEDY}",
-                png_number(found),
-                png_number(Self::SRGB)
-            )),
-            _ => Ok(Meaning::Srgb),
-        }
+        .meaning(depth)
+        .map_err(|problem| format!("{problem} (gAMA, cHRM); {REMEDY}"))
     }
+}
 
-    fn are_srgb(found: [u32; 8]) -> bool {
-        const SRGB: [u32; 8] = [
-            31_270, 32_900, 64_000, 33_000, 30_000, 60_000, 15_000, 6_000,
-        ];
-        found
-            .iter()
-            .zip(SRGB)
-            .all(|(found, expected)| found.abs_diff(expected) <= Self::PRIMARIES_TOLERANCE)
-    }
+/// The error for primaries without a number in H.273.
+fn unknown_primaries(stated: [u32; 8]) -> String {
+    let [white, red, green, blue] =
+        [0, 2, 4, 6].map(|i| format!("{}, {}", png_number(stated[i]), png_number(stated[i + 1])));
+    format!(
+        "the primaries of the image (cHRM) are not those of sRGB (white {white}, red {red}, green {green}, blue {blue}); {REMEDY}"
+    )
 }
 
 /// Converts a number that a PNG file states in units of 0.00001.

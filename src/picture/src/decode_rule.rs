@@ -113,9 +113,11 @@ pub enum Transfer {
 /// Handling of images whose file states other colours than sRGB.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub enum ColourRule {
-    /// Convert them to sRGB
+    /// Convert them to sRGB; HDR is refused
     #[default]
     Convert,
+    /// Convert HDR (HLG and PQ), too: light above 203 cd/m² becomes white
+    Clip,
     /// Take their codes as sRGB
     Ignore,
 }

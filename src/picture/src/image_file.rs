@@ -5,6 +5,7 @@ mod cmyk_tiff;
 mod exr_layers;
 mod facts;
 pub mod format;
+mod huffman_tables;
 mod jpeg_markers;
 mod png_chunks;
 mod tiff_tags;
@@ -21,6 +22,7 @@ use image::{ColorType, DynamicImage, ImageDecoder, ImageReader, Limits, RgbImage
 use self::exr_layers::ExrFile;
 use self::facts::{Depth, FileFacts, InkForm, fault};
 use self::format::FileFormat;
+use self::huffman_tables::with_standard_tables;
 use super::colour::{CodeDepth, ColourSpace, ColourTag, Inks, Meaning};
 use super::decode_rule::{ColourRule, DecodeRule, Transfer};
 use darkqa_ground::error::{Error, Result};
@@ -172,10 +174,7 @@ impl ImageFile {
             return self.ink_colours().ok().map(|inks| inks.note());
         }
         match (self.rule.colour, colour.meaning(depth.code_depth())) {
-            (ColourRule::Convert, Err(_) | Ok(Meaning::Linear)) | (_, Ok(Meaning::Srgb)) => None,
-            (ColourRule::Convert, Ok(Meaning::Other(space))) => {
-                Some(space.note(ColourHandling::Converted))
-            }
+            (_, Ok(Meaning::Srgb)) => None,
             (ColourRule::Ignore, Ok(Meaning::Other(space))) => {
                 Some(space.note(ColourHandling::Ignored))
             }
@@ -184,6 +183,12 @@ impl ImageFile {
                 profile: None,
                 handling: ColourHandling::Ignored,
             }),
+            (_, Err(_) | Ok(Meaning::Linear)) => None,
+            (rule, Ok(Meaning::Other(space))) => {
+                let is_refused =
+                    rule == ColourRule::Convert && space.handling == ColourHandling::Clipped;
+                (!is_refused).then(|| space.note(space.handling))
+            }
         }
     }
 
@@ -200,14 +205,22 @@ impl ImageFile {
         }
         let meaning = match colour {
             ColourRule::Ignore => Meaning::Srgb,
-            ColourRule::Convert => facts.colour.meaning(facts.depth.code_depth())?,
+            ColourRule::Convert | ColourRule::Clip => {
+                facts.colour.meaning(facts.depth.code_depth())?
+            }
         };
+        if let Meaning::Other(space) = &meaning
+            && space.handling == ColourHandling::Clipped
+            && colour == ColourRule::Convert
+        {
+            return Err(space.hdr_refusal());
+        }
         let is_linear = transfer == Transfer::Linear && facts.depth == Depth::Sixteen;
         Ok(match (meaning, facts.depth) {
             (Meaning::Linear, _) | (Meaning::Srgb, Depth::Float) => Interpretation::Light(None),
             (Meaning::Other(space), Depth::Float) => Interpretation::Light(Some(space)),
             (Meaning::Srgb, _) if is_linear => {
-                if colour == ColourRule::Convert && facts.colour != ColourTag::None {
+                if colour != ColourRule::Ignore && facts.colour != ColourTag::None {
                     return Err(contradiction(&facts.colour));
                 }
                 Interpretation::Light(None)
@@ -329,7 +342,9 @@ impl ImageFile {
         let colours = self.ink_colours().map_err(|problem| self.error(problem))?;
         let inks = guarded(|| match form {
             InkForm::Tiff => cmyk_tiff::inks(&self.bytes, width as usize * height as usize),
-            InkForm::Plain | InkForm::Adobe => cmyk_jpeg::inks(&self.bytes, form == InkForm::Adobe),
+            InkForm::Plain | InkForm::Adobe => {
+                cmyk_jpeg::inks(&with_standard_tables(&self.bytes), form == InkForm::Adobe)
+            }
         })
         .map_err(|problem| self.error(problem))?;
         let image = RgbImage::from_raw(width, height, colours.srgb(&inks))
@@ -412,6 +427,7 @@ impl ImageFile {
         }
         let bytes = match format {
             FileFormat::Png => png_chunks::without_metadata(&self.bytes),
+            FileFormat::Jpeg => with_standard_tables(&self.bytes),
             _ => Cow::Borrowed(&*self.bytes),
         };
         let mut reader = ImageReader::new(Cursor::new(bytes));

@@ -24,6 +24,7 @@ mod plain_png;
 pub mod raw_image;
 pub mod raw_png;
 mod scaling;
+mod stated_colours;
 
 pub use bilinear::bilinear;
 pub use decode_rule::DecodeRule;
@@ -33,3 +34,4 @@ pub use image_file::ImageFile;
 pub use payload::{Payload, decode_data_url};
 pub use payload_format::{ImageArgs, PayloadFormat, Quality};
 pub use scaling::Scaling;
+pub use stated_colours::{FrameConversion, StatedColours};

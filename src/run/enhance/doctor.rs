@@ -12,8 +12,9 @@ use crate::picture::{Payload, PayloadFormat, png};
 use crate::report::doctor::{DoctorCell, DoctorColumn, DoctorPage, page};
 use crate::runs::Outcome;
 use crate::types::manifests::Status;
-use crate::types::{Decides, Rgb};
-use darkqa_enhance::{Enhancer, Examination, ImageOutput, Settled};
+use crate::types::{Decides, Rgb, Severity};
+use darkqa_enhance::{Enhancer, Examination, ImageOutput, Settled, burnt_out};
+use darkqa_light::expose;
 
 /// File names of the page and the picture.
 const PAGE: &str = "doctor.html";
@@ -39,9 +40,14 @@ pub(super) fn doctor(
     image: ImageOutput,
     enhancer: &mut Enhancer,
     dark: &[Rgb],
+    sample: &[Rgb],
 ) -> Result<Outcome> {
     let out = &args.out;
     let examination = enhancer.examine(dark, image)?;
+    let burnt = match examination.settled {
+        Settled::Yes => burnt_out_text(enhancer, sample),
+        Settled::No => None,
+    };
     let model = enhancer.path();
     let lines: Vec<String> = examination
         .proposal
@@ -56,6 +62,9 @@ pub(super) fn doctor(
     write(&out.join(PAGE), html.as_bytes())?;
     write(&out.join(PICTURE), &png(&picture(&examination))?)?;
     let mut output = format!("{}\n", examination.conclusion);
+    if let Some(burnt) = burnt {
+        let _ = writeln!(output, "{burnt}");
+    }
     if !lines.is_empty() {
         let path = enhancer.sidecar_path();
         let _ = writeln!(output, "\nProposed for {}:\n{sidecar}", path.display());
@@ -97,6 +106,38 @@ pub(super) fn doctor(
         },
         output,
     ))
+}
+
+/// A sentence about burnt-out images of the sample as given and at L1, which are brighter than the frames of the examination; `None` if no
+/// image is burnt out.
+fn burnt_out_text(enhancer: &mut Enhancer, sample: &[Rgb]) -> Option<String> {
+    let mut parts = Vec::new();
+    for (words, drop) in [("as they are", None), ("at L1", Some(Severity::L1))] {
+        let shares: Vec<f64> = sample
+            .iter()
+            .filter_map(|image| {
+                let image = match drop {
+                    None => image.clone(),
+                    Some(drop) => expose(image, drop),
+                };
+                burnt_out([&image, &enhancer.enhance(&image).ok()?])
+            })
+            .collect();
+        if !shares.is_empty() {
+            let mean = shares.iter().sum::<f64>() / shares.len() as f64;
+            let (burnt, all) = (shares.len(), sample.len());
+            parts.push(format!(
+                "{burnt} of {all} {words} ({:.0} % of the pixels)",
+                100.0 * mean
+            ));
+        }
+    }
+    (!parts.is_empty()).then(|| {
+        format!(
+            "Brighter images are burnt out, with codes of 254 or 255 where the dark ones have detail: {}.",
+            parts.join(", ")
+        )
+    })
 }
 
 fn html(

@@ -20,8 +20,10 @@ use crate::images::stored::{ImageCounts, ImageOrigin, OutputImage, Refusals};
 use crate::runs::Outcome;
 use crate::runs::shard_args::{ShardArgs, keep_shard};
 use crate::types::manifests::Status;
-use crate::types::{Decides, Digest, FrameId, InputNote, Rgb};
-use darkqa_enhance::{Enhancer, FRAMES, ImageOutput, ModelFile, SizeArgs, list_of_presets};
+use crate::types::{Decides, Digest, EnhancerName, FrameId, InputNote, Rgb};
+use darkqa_enhance::{
+    Enhancer, FRAMES, ImageOutput, ModelFile, SizeArgs, burnt_out, list_of_presets,
+};
 use doctor::DoctorFileArgs;
 
 /// Maximum number of outputs tried as the image. Chosen: models that output each of their steps have fewer.
@@ -174,7 +176,7 @@ fn examine(args: &DoctorArgs, progress: &Progress) -> Result<Outcome> {
     progress.print_on_terminal(&format!(
         "{model}: enhancing {n} dark images with each value range and colour order"
     ));
-    doctor::doctor(&args.files, image, &mut enhancer, &dark)
+    doctor::doctor(&args.files, image, &mut enhancer, &dark, &sample)
 }
 
 /// A sample of the images. Unreadable ones are skipped here, and reported when they are enhanced.
@@ -208,6 +210,7 @@ fn enhance_images(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome> {
     let overruled_problem = enhancer.overruled_problem();
     let mut counts = ImageCounts::default();
     let refusals = Refusals::default();
+    let mut burnt = Vec::new();
     for entry in &images.entries {
         let picture = images.picture(entry);
         let outcome = picture.and_then(|picture| {
@@ -216,8 +219,12 @@ fn enhance_images(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome> {
             let place = OutputImage::new(out, &entry.stem, args.force)
                 .with_overruled_problem(overruled_problem.clone());
             place.write_unless_present(&origin, || {
-                let enhanced = enhancer.enhance(&picture.decode()?);
-                enhanced.map_err(|e| Error::data(format_args!("image {:?}", entry.id.0), e))
+                let degraded = picture.decode()?;
+                let enhanced = enhancer
+                    .enhance(&degraded)
+                    .map_err(|e| Error::data(format_args!("image {:?}", entry.id.0), e))?;
+                burnt.extend(burnt_out([&degraded, &enhanced]).map(|share| (&entry.id, share)));
+                Ok(enhanced)
             })
         });
         match outcome {
@@ -236,6 +243,7 @@ fn enhance_images(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome> {
     drop(bar);
     tally.warn();
     refusals.log();
+    warn_of_burnt_out(&burnt, counts.written, enhancer.name());
     let used = enhancer.usage().note();
     let sizes = if used.size_counts.whole < used.size_counts.images {
         used.sizes + "\n"
@@ -258,6 +266,25 @@ fn enhance_images(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome> {
             counts.not_written_text()
         ),
     ))
+}
+
+/// Warns of burnt-out images, given with their shares of white pixels, among `made` images.
+fn warn_of_burnt_out(burnt: &[(&FrameId, f64)], made: usize, enhancer: &EnhancerName) {
+    let Some((example, _)) = burnt.first() else {
+        return;
+    };
+    let mean = burnt.iter().map(|(_, share)| share).sum::<f64>() / burnt.len() as f64;
+    tracing::warn!(
+        "{enhancer}: {} of {} burnt out, with codes of 254 or 255 where the dark ones have detail: {:.0} % of the pixels (for example {})",
+        burnt.len(),
+        if made == 1 {
+            "1 image is".to_owned()
+        } else {
+            format!("{made} images are")
+        },
+        100.0 * mean,
+        example.0
+    );
 }
 
 /// All facts that determine the pixels of an enhanced image.

@@ -19,7 +19,7 @@ use crate::picture::decode_rule::DecodeRule;
 use crate::picture::raw_image::RawPixels;
 use crate::types::text::counted;
 use crate::types::text::excerpt;
-use crate::types::{FrameId, Labels, Rgb};
+use crate::types::{DepthNote, FrameId, Labels, Pixels, Rgb, Rgb16Image};
 
 /// Maximum size of the frames waiting to be written, in bytes (chosen). Writing needs two to three times as much memory.
 const MAX_WAITING_BYTES: usize = 32 << 20;
@@ -256,20 +256,50 @@ impl<'a> FrameWriter<'a> {
                         excerpt(&format, 60)
                     ));
                 }
-                // Only the problem, because the caller adds the place.
-                let (width, height) = file.check().map_err(|e| match e {
-                    Error::Data { problem, .. } => problem,
-                    other => other.to_string(),
-                })?;
                 let note = file.note();
+                let is_turned = note.orientation.is_some();
+                let frame_id = message.frame_id;
+                let has_white = match note.depth {
+                    None => false,
+                    Some(DepthNote::Rgb16Image) => note.colour.is_some(),
+                    Some(DepthNote::Light) => true,
+                };
+                if self.white != u16::MAX && has_white {
+                    let problem = "the file states what its codes mean, so --white does not apply; leave it out, or take the topic alone";
+                    return Err(problem.to_owned());
+                }
+                if note.depth == Some(DepthNote::Rgb16Image) {
+                    let image = deep_image(&file)?;
+                    self.tally.add(&FrameId(frame.words()), &note);
+                    let size = (image.width(), image.height());
+                    let pixels = RawPixels::Rgb16Image(image);
+                    let peak_16 = pixels.peak_16();
+                    let bytes = if self.white == u16::MAX {
+                        file.bytes().to_vec()
+                    } else {
+                        pixels
+                            .with_white(self.white)
+                            .png()
+                            .map_err(|e| e.to_string())?
+                    };
+                    return Ok(EncodedFrame {
+                        bytes,
+                        ending: "png",
+                        size,
+                        is_turned,
+                        peak_16,
+                        frame_id,
+                    });
+                }
+                let (width, height) = file.check().map_err(problem)?;
                 self.tally.add(&FrameId(frame.words()), &note);
                 Ok(EncodedFrame {
                     size: (width as usize, height as usize),
-                    is_turned: note.orientation.is_some(),
+                    is_turned,
                     peak_16: None,
                     ending,
                     bytes: file.bytes().to_vec(),
-                    frame_id: message.frame_id,
+                    frame_id,
                 })
             }
         }
@@ -319,29 +349,53 @@ impl<'a> FrameWriter<'a> {
     }
 }
 
+/// The codes of an image file of 16 bits, converted to sRGB.
+fn deep_image(file: &ImageFile) -> Result<Rgb16Image, String> {
+    match file.pixels().map_err(problem)? {
+        Pixels::Rgb16Image(image) => Ok(Arc::unwrap_or_clone(image)),
+        Pixels::Codes8(_) | Pixels::Light(_) => Err("codes of 16 bits expected".to_owned()),
+    }
+}
+
+/// The problem of an error without its place, which the caller adds.
+fn problem(error: Error) -> String {
+    match error {
+        Error::Data { problem, .. } => problem,
+        other => other.to_string(),
+    }
+}
+
 /// The thumbnail of a message's image.
 ///
 /// # Errors
 /// If the message has no image that can be decoded.
 pub(super) fn thumbnail(channel: &Channel, bytes: &[u8], white: u16) -> Result<Thumbnail, String> {
     match parse(channel, bytes)?.image {
-        MessageImage::Raw(image) => match image.decode()?.with_white(white) {
-            RawPixels::Codes8(image) => Ok(Thumbnail::new(&image)),
-            RawPixels::Rgb16Image(image) => {
-                let high = image
-                    .samples()
-                    .iter()
-                    .map(|code| (code >> 8) as u8)
-                    .collect();
-                let image = Rgb::new(image.height(), image.width(), high);
-                image
-                    .map(|image| Thumbnail::new(&image))
-                    .map_err(|e| e.to_string())
-            }
-        },
+        MessageImage::Raw(image) => thumbnail_of_pixels(image.decode()?.with_white(white)),
         MessageImage::File { bytes, .. } => {
             let file = ImageFile::new(bytes.into_owned(), String::new(), DecodeRule::default());
+            if file.note().depth == Some(DepthNote::Rgb16Image) {
+                let pixels = RawPixels::Rgb16Image(deep_image(&file)?);
+                return thumbnail_of_pixels(pixels.with_white(white));
+            }
             file.decode()
+                .map(|image| Thumbnail::new(&image))
+                .map_err(|e| e.to_string())
+        }
+    }
+}
+
+fn thumbnail_of_pixels(pixels: RawPixels) -> Result<Thumbnail, String> {
+    match pixels {
+        RawPixels::Codes8(image) => Ok(Thumbnail::new(&image)),
+        RawPixels::Rgb16Image(image) => {
+            let high = image
+                .samples()
+                .iter()
+                .map(|code| (code >> 8) as u8)
+                .collect();
+            let image = Rgb::new(image.height(), image.width(), high);
+            image
                 .map(|image| Thumbnail::new(&image))
                 .map_err(|e| e.to_string())
         }

@@ -4,13 +4,14 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use clap::Args;
+use serde_json::json;
 
 use super::frame_writer::{ChosenFrame, FrameSource, FrameWriter, summary};
 use super::recording::{WrittenArgs, drive_name, warn_of_missed};
 use crate::error::{Error, Result};
 use crate::images::progress::Progress;
 use crate::images::workers::pool;
-use crate::import::recording::video::Video;
+use crate::import::recording::video::{Video, VideoFrames};
 use crate::import::recording::{SamplingArgs, Stretches, Thumbnail, TopicClock, seconds};
 use crate::runs::Outcome;
 use crate::types::Decides;
@@ -39,15 +40,7 @@ pub(crate) struct VideoArgs {
 pub(crate) fn import(args: &VideoArgs, progress: &Progress) -> Result<Outcome> {
     let video = Video::open(&args.file)?;
     let Some(out) = &args.out else {
-        let duration = video
-            .duration
-            .map_or("unknown duration".to_owned(), |duration| {
-                format!("{duration} s")
-            });
-        return Ok(Outcome::text(
-            Outcome::complete_if(true),
-            format!("{}; {duration}\n", video.stream),
-        ));
+        return Ok(describe(&video));
     };
     args.written.check(out)?;
     let duration = match (args.sampling.max_frames, video.duration) {
@@ -101,6 +94,7 @@ pub(crate) fn import(args: &VideoArgs, progress: &Progress) -> Result<Outcome> {
     }
     drop(bar);
     warn_of_missed(&sampler, &path);
+    let colours = converted_colours(&frames, &path);
     let problem = match problem {
         Some(problem) => Some(format!("{problem}; frames up to there are kept")),
         None => frames
@@ -112,7 +106,10 @@ pub(crate) fn import(args: &VideoArgs, progress: &Progress) -> Result<Outcome> {
     if let Some(warning) = problem.or(early.map(|early| format!("{path}: {early}"))) {
         tracing::warn!("{warning}");
     }
-    let info = args.written.info("video", &drive);
+    let mut info = args.written.info("video", &drive);
+    if let Some(colours) = &colours {
+        info["colours"] = json!(colours);
+    }
     let scenes = writer.finish(&path, &info)?;
     let failed = writer.warn_of_failures();
     let mut output = summary(
@@ -129,11 +126,39 @@ pub(crate) fn import(args: &VideoArgs, progress: &Progress) -> Result<Outcome> {
         video.stream,
         args.sampling.description()
     );
+    if let Some(colours) = colours {
+        let _ = writeln!(output, "colours: {colours}");
+    }
     Ok(Outcome::wrote(
         out,
         Outcome::complete_if(failed == 0 && is_whole),
         output,
     ))
+}
+
+/// The stream and the duration of a video.
+fn describe(video: &Video) -> Outcome {
+    let duration = video
+        .duration
+        .map_or("unknown duration".to_owned(), |duration| {
+            format!("{duration} s")
+        });
+    Outcome::text(
+        Outcome::complete_if(true),
+        format!("{}; {duration}\n", video.stream),
+    )
+}
+
+/// The colours of the frames and their conversion; `None` if the codes are taken as sRGB codes. Warns of clipped light in HDR.
+fn converted_colours(frames: &VideoFrames, path: &str) -> Option<String> {
+    let colours = frames.converted_from()?;
+    if let Some(share) = frames.clipped_share() {
+        tracing::warn!(
+            "{path}: the video is {colours}: converted to sRGB, where light above 203 cd/m² becomes white ({:.1} % of the pixels)",
+            100.0 * share
+        );
+    }
+    Some(format!("{colours}, converted to sRGB"))
 }
 
 /// Seconds without frames that are normal at the end of a video, where the sound may be longer than the picture; chosen.

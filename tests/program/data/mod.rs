@@ -10,3 +10,4 @@ mod recordings;
 mod rooms;
 mod scenes;
 mod unlabelled;
+mod videos;

@@ -1,13 +1,12 @@
-//! `import mcap`, `import rosbag` and `import video`: frames of recordings that the tests write.
+//! `import mcap` and `import rosbag`: frames of recordings that the tests write.
 
 use std::fs;
-use std::path::Path;
 
 use serde_json::Value;
 
+use crate::support::image_files::{chunk, with_chunks};
 use crate::support::recording::{Compression, Records, SIZE, compressed, drive, image, picture};
 use crate::support::run::{Bench, Called};
-use crate::support::snapshot::redacted;
 
 /// A folder with the recording `drive.mcap`.
 fn with_recording(file: impl AsRef<[u8]>) -> Bench {
@@ -380,6 +379,80 @@ fn sixteen_bit_codes_are_scaled() {
     assert_eq!((third(), &*scaled.stderr), ([65535; 3], ""));
 }
 
+/// A PNG of `compressed_image_transport`: the same code in 2 × 2 pixels of a number type.
+fn png_of<P: image::Pixel + image::PixelWithColorType>(pixel: P) -> Vec<u8>
+where
+    [P::Subpixel]: image::EncodableLayout,
+{
+    let mut file = std::io::Cursor::new(Vec::new());
+    image::ImageBuffer::from_pixel(2, 2, pixel)
+        .write_to(&mut file, image::ImageFormat::Png)
+        .unwrap();
+    file.into_inner()
+}
+
+#[test]
+fn white_applies_to_compressed_images_of_16_bits() {
+    for (format, file) in [
+        (
+            "mono16; png compressed mono16",
+            png_of(image::Luma([2048_u16])),
+        ),
+        (
+            "rgb16; png compressed rgb16",
+            png_of(image::Rgb([2048_u16; 3])),
+        ),
+    ] {
+        let mut records = Records::default();
+        records.topic(1, "/c", "sensor_msgs/msg/CompressedImage", "cdr", "");
+        records.message(1, 0.0, &compressed(0.0, format, &file));
+        let bench = with_recording(records.file());
+        let path = bench.path("out/scenes/drive-0000/rgb/000000.png");
+        let dark = import(&bench, "--out out").ended(0);
+        assert!(dark.stderr.contains("is 2048: they are dark"), "{dark:?}");
+        assert!(dark.stderr.contains("set --white 4095"), "{dark:?}");
+        assert_eq!(fs::read(&path).unwrap(), file);
+        // Choosing frames by their change reads the images, too.
+        let line = "--out out --force --white 4095 --changed 5";
+        let called = import(&bench, line).ended(0);
+        assert!(!called.stderr.contains("--white"), "{called:?}");
+        let scaled = image::open(&path).unwrap().into_rgb16();
+        assert_eq!(scaled[(1, 1)].0, [(2048 * 65_535_u32 / 4095 + 1) as u16; 3]);
+    }
+}
+
+#[test]
+fn white_does_not_change_compressed_images_of_8_bits() {
+    let file = png_of(image::Rgb([200_u8; 3]));
+    let mut records = Records::default();
+    records.topic(1, "/c", "sensor_msgs/msg/CompressedImage", "cdr", "");
+    records.message(1, 0.0, &compressed(0.0, "rgb8; png compressed bgr8", &file));
+    let bench = with_recording(records.file());
+    let called = import(&bench, "--out out --white 4095").ended(0);
+    assert_eq!(called.stderr, "");
+    let path = bench.path("out/scenes/drive-0000/rgb/000000.png");
+    assert_eq!(fs::read(path).unwrap(), file);
+}
+
+/// Linear light has its white already.
+#[test]
+fn white_is_refused_for_files_that_state_their_codes() {
+    let gamma = chunk(*b"gAMA", &100_000_u32.to_be_bytes());
+    let file = with_chunks(&png_of(image::Rgb([2048_u16; 3])), &[gamma]);
+    let mut records = Records::default();
+    records.topic(1, "/c", "sensor_msgs/msg/CompressedImage", "cdr", "");
+    records.message(1, 0.0, &compressed(0.0, "png", &file));
+    let bench = with_recording(records.file());
+    let called = import(&bench, "--out out --white 4095").ended(2);
+    insta::assert_snapshot!(called.messages(), @"
+    exit code: 2
+    ERROR drive: /c at [TIME]: the file states what its codes mean, so --white does not apply; leave it out, or
+        take the topic alone
+    error: drive.mcap: no frame of it could be taken
+    ");
+    import(&bench, "--out out").ended(0);
+}
+
 #[test]
 fn unrelated_files_are_identified() {
     for (bytes, expected) in [
@@ -459,120 +532,5 @@ fn ros_1_bag_names_its_conversion() {
       pip install rosbags
       rosbags-convert --src 'my drive.bag' --dst 'my drive' --dst-storage mcap
       darkqa-eval import mcap 'my drive'
-    ");
-}
-
-/// A program `ffmpeg` that writes four images, half a second apart, as ffmpeg does.
-#[cfg(unix)]
-fn with_ffmpeg(bench: &Bench, end: &str) {
-    use std::os::unix::fs::PermissionsExt as _;
-
-    let script = format!(
-        r#"#!/bin/sh
-echo "$@" >> {calls}
-echo 'ffmpeg version 5.1.6 Copyright' >&2
-echo '  Duration: 00:00:02.00, start: 0.000000, bitrate: 9 kb/s' >&2
-echo '  Stream #0:0: Video: h264 (High), yuv420p, 4x2, 2 fps' >&2
-case "$*" in *image2pipe*) ;; *) exit 1;; esac
-echo '[Parsed_showinfo_1 @ 0x1] config in time_base: 1/10, frame_rate: 1/1' >&2
-for i in 0 1 2 3; do
-  echo "[Parsed_showinfo_1 @ 0x1] n: $i pts: $((10 * i + 5)) pts_time:$i.5 duration: 1" >&2
-  printf 'P6\n4 2\n255\nabcdefghijklmnopqrstuvw%s' $i
-done
-{end}
-"#,
-        calls = bench.path("calls").display()
-    );
-    let path = bench.file("bin/ffmpeg", script);
-    fs::set_permissions(path, fs::Permissions::from_mode(0o755)).unwrap();
-}
-
-#[cfg(unix)]
-fn import_video(bench: &Bench, line: &str, path: &Path) -> Called {
-    let words: Vec<&str> = line.split_whitespace().collect();
-    let mut command = bench.command(&[&["import", "video", "drive.mp4"], &words[..]].concat());
-    let system = std::env::var("PATH").unwrap_or_default();
-    let path = format!("{}:{system}", path.display());
-    crate::support::run::called(command.env("PATH", path))
-}
-
-#[cfg(unix)]
-#[test]
-fn frames_of_video_come_from_ffmpeg() {
-    let bench = Bench::new();
-    bench.file("drive.mp4", b"x");
-    with_ffmpeg(&bench, "exit 0");
-    let described = import_video(&bench, "", &bench.path("bin")).ended(0);
-    assert_eq!(described.stdout, "h264 (High), yuv420p, 4x2, 2 fps; 2 s\n");
-    let called = import_video(
-        &bench,
-        "--every 1 --stretch 2 --out out",
-        &bench.path("bin"),
-    )
-    .ended(0);
-    insta::assert_snapshot!(called, @"
-    exit code: 0
-    stdout:
-    out: 4 frames of 2 scenes ([TIME] each)
-    video: h264 (High), yuv420p, 4x2, 2 fps; one every [TIME]
-    ");
-    assert_eq!(frames(&bench)[3]["t"], 3.5);
-    let image = image::open(bench.path("out/scenes/drive-0001/rgb/000003.png"))
-        .unwrap()
-        .into_rgb8();
-    assert_eq!(
-        (image.dimensions(), image[(0, 0)].0, image[(3, 1)].0),
-        ((4, 2), *b"abc", *b"vw3")
-    );
-    let calls = fs::read_to_string(bench.path("calls")).unwrap();
-    insta::assert_snapshot!(redacted(&calls), @"
-    -nostdin -nostats -protocol_whitelist file,pipe -i file:drive.mp4
-    -nostdin -nostats -protocol_whitelist file,pipe -i file:drive.mp4
-    -nostdin -nostats -protocol_whitelist file,pipe -i file:drive.mp4 -map 0:v:0 -vf
-        select='isnan(prev_selected_t)+gt(floor((t-start_t)/1+1e-7),floor((prev_selected_t-start_t)/1+1e-7))',showinfo
-        -fps_mode passthrough -pix_fmt rgb24 -c:v ppm -f image2pipe -
-    ");
-}
-
-#[cfg(unix)]
-#[test]
-fn a_broken_video_gives_its_frames() {
-    let bench = Bench::new();
-    bench.file("drive.mp4", b"x");
-    with_ffmpeg(&bench, "echo 'moov atom not found' >&2; exit 1");
-    let called = import_video(&bench, "--every 0 --out out", &bench.path("bin")).ended(1);
-    insta::assert_snapshot!(called.messages(), @"
-    exit code: 1
-     WARN drive.mp4: ffmpeg: it ends with an error; Stream #0:0: Video: h264 (High), yuv420p, 4x2, 2 fps; moov
-        atom not found; frames up to there are kept
-    ");
-    assert_eq!(frames(&bench).len(), 4);
-}
-
-#[cfg(unix)]
-#[test]
-fn damage_that_ffmpeg_reports_is_named() {
-    let bench = Bench::new();
-    bench.file("drive.mp4", b"x");
-    with_ffmpeg(&bench, "echo 'error while decoding MB 3 5' >&2; exit 0");
-    let called = import_video(&bench, "--every 0 --out out", &bench.path("bin")).ended(1);
-    insta::assert_snapshot!(called.messages(), @"
-    exit code: 1
-     WARN drive.mp4: ffmpeg reports a problem: error while decoding MB 3 5; its frames are kept
-    ");
-    assert_eq!(frames(&bench).len(), 4);
-}
-
-#[cfg(unix)]
-#[test]
-fn without_ffmpeg_the_remedy_is_named() {
-    let bench = Bench::new();
-    bench.file("drive.mp4", b"x");
-    let mut command = bench.command(&["import", "video", "drive.mp4", "--out", "out"]);
-    let called = crate::support::run::called(command.env("PATH", bench.path("empty"))).ended(2);
-    insta::assert_snapshot!(called.messages(), @"
-    exit code: 2
-    error: ffmpeg: not found on PATH; videos are decoded by it: install it (apt install ffmpeg, brew install
-        ffmpeg), or give the folder of extracted images to --data
     ");
 }

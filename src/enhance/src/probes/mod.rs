@@ -1,5 +1,6 @@
 //! Probes of a model on dark frames, and plausibility of its images.
 
+mod burnt_out;
 mod doctor;
 mod endpoints;
 mod expressions;
@@ -11,6 +12,7 @@ mod range_pair;
 mod trial_images;
 mod usage;
 
+pub use burnt_out::burnt_out;
 pub use doctor::{Examination, ImageOutput, ProposedLine, Settled};
 pub use findings::Findings;
 pub(super) use plausible::UnclampedImage;

@@ -6,7 +6,7 @@ use super::plausible::UnclampedImage;
 use super::probe::{Conclusion, OUTPUT, PairTrial, Probe, StatedRanges};
 use super::range_pair::RangePair;
 use super::trial_images::run_frames;
-use super::usage::{ImageUse, Implausible, Judgement, doctor_advice};
+use super::usage::{ImageUse, Implausible, Judgement, doctor_advice, white_percent};
 use crate::conventions::sidecar::{self, ADD, ModelSidecar};
 use crate::conventions::{Rounding, ValueRange};
 use crate::enhancer::Enhancer;
@@ -139,8 +139,10 @@ impl Enhancer {
         let used = ImageUse {
             // Judged in any case, because another run that reads the image from a store may need the judgement.
             seen: Judgement::on([image, &enhanced]),
+            white: white_percent([image, &enhanced]),
             sizes: self.sizes().since(&before),
         };
+        used.count_burnt_out(&self.usage(), place, implausible);
         self.judge(&used.seen, place, implausible)?;
         Ok((enhanced, used))
     }

@@ -7,6 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use serde::{Deserialize, Serialize};
 
+use super::burnt_out::burnt_out;
 use super::plausible::{DARK, Gravity, UnclampedImage, Verdict, brightness, judge};
 use darkqa_ground::error::{Error, Result};
 use darkqa_ground::types::manifests::{ConventionLine, ELSEWHERE, EnhancerNote, FlawedImage};
@@ -57,6 +58,9 @@ impl Judgement {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ImageUse {
     pub(super) seen: Judgement,
+    /// Percentage of white pixels, if the image is burnt out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) white: Option<u8>,
     /// How the size of the image was handled.
     pub(super) sizes: SizeLog,
 }
@@ -74,16 +78,32 @@ impl ImageUse {
         implausible: Implausible,
     ) -> Result<()> {
         usage.add_sizes_of_stored(&self.sizes);
+        self.count_burnt_out(usage, place, implausible);
         self.seen.record(usage, model, place, implausible)
     }
 }
 
 impl ImageUse {
+    /// Counts the image of a frame and condition (`place`) if it is burnt out, unless images are not judged.
+    pub(super) fn count_burnt_out(
+        &self,
+        usage: &Usage,
+        place: [&dyn ToString; 2],
+        implausible: Implausible,
+    ) {
+        if let Some(white) = self.white
+            && implausible != Implausible::NotLookedFor
+        {
+            usage.count_burnt_out(white, place);
+        }
+    }
+
     /// Contribution of an image that another program enhanced.
     #[must_use]
     pub fn for_external([degraded, made]: [&Rgb; 2]) -> Self {
         Self {
             seen: Judgement::on([degraded, made]),
+            white: white_percent([degraded, made]),
             sizes: SizeLog::default(),
         }
     }
@@ -99,12 +119,18 @@ impl ImageUse {
         place: [&dyn ToString; 2],
         implausible: Implausible,
     ) -> Result<()> {
+        self.count_burnt_out(usage, place, implausible);
         let judged = usage.judge(&self.seen, place, implausible);
         judged.map_err(|problem| {
             let remedy = "check that each has the name of its own dark image; --allow bad-enhancer uses them anyway";
             Error::data(folder.display(), format_args!("{problem}; {remedy}"))
         })
     }
+}
+
+/// Percentage of white pixels of an enhanced image that is burnt out; `None` if it is not.
+pub(super) fn white_percent(images: [&Rgb; 2]) -> Option<u8> {
+    burnt_out(images).map(|share| (100.0 * share).round() as u8)
 }
 
 impl Judgement {
@@ -146,6 +172,8 @@ struct UsageState {
     impossible: usize,
     /// Digests of the frames and conditions whose images were judged.
     judged: HashSet<Digest>,
+    /// Digests of the frames and conditions whose images are burnt out.
+    burnt_out: HashSet<Digest>,
     /// Size adaptations by twin.
     sizes: BTreeMap<usize, SizeLog>,
 }
@@ -199,6 +227,18 @@ impl Usage {
     /// Changes the record.
     pub(crate) fn update(&self, change: impl FnOnce(&mut EnhancerNote)) {
         self.with(|state| change(&mut state.note));
+    }
+
+    /// Counts a burnt-out image with its percentage of white pixels. An image of the same frame and condition counts once.
+    fn count_burnt_out(&self, white: u8, [frame, condition]: [&dyn ToString; 2]) {
+        let place = [frame, condition].map(ToString::to_string);
+        let key = Digest::from_parts(place.iter().map(String::as_bytes));
+        self.with(|state| {
+            if state.burnt_out.insert(key) {
+                let [frame, condition] = place;
+                state.note.count_burnt_out(frame, condition, white);
+            }
+        });
     }
 
     /// Counts the judgement of an image. An image of the same frame and condition counts once.
@@ -303,6 +343,33 @@ mod tests {
         let judged = usage.note().judged;
         assert_eq!((judged.images, judged.flaws()), (3, 3));
         assert_eq!(judged.examples.len(), 3);
+    }
+
+    #[test]
+    fn burnt_out_images_count_once_by_condition() {
+        let usage = Usage::default();
+        let white = Rgb::new(96, 96, vec![255; 96 * 96 * 3]).unwrap();
+        let burnt = ImageUse::for_external([&squares(2.0), &white]);
+        let good = ImageUse::for_external([&squares(2.0), &squares(4.0)]);
+        assert_eq!(good, ImageUse::default());
+        for (used, frame, how) in [
+            (&burnt, 1, Implausible::Used),
+            (&burnt, 0, Implausible::Refused),
+            (&burnt, 1, Implausible::Used),
+            (&good, 2, Implausible::Used),
+            (&burnt, 3, Implausible::NotLookedFor),
+        ] {
+            used.record(&usage, Path::new("m.onnx"), [&frame, &"L1+ev+m"], how)
+                .unwrap();
+        }
+        let note = usage.note();
+        let found = &note.burnt_out["L1+ev+m"];
+        assert_eq!(
+            (found.images, found.percents, &*found.example),
+            (2, 200, "0")
+        );
+        let stored = serde_json::to_value(&good).unwrap();
+        assert_eq!(stored.get("white"), None);
     }
 
     #[test]

@@ -1,11 +1,11 @@
 //! Conversion of codes and light from other RGB colour spaces to sRGB: [`Conversion`].
 
-use super::curve::ToneCurve;
+use super::curve::{ToneCurve, WHITE_NITS, interpolate};
 use super::primaries::{Matrix, times};
 use super::srgb::{EIGHT, SIXTEEN, SrgbCodes};
 
 /// Conversion of RGB colours to sRGB: a tone curve per channel to linear light, a matrix to the primaries of sRGB, and the sRGB curve.
-/// White stays white, and colours outside the gamut of sRGB are clipped (relative colorimetric).
+/// White stays white, and colours outside the gamut of sRGB are clipped (relative colorimetric), as is light above white in HDR.
 ///
 /// Computed in double precision, because a library that uses the vector instructions of the machine gives codes that differ by one between
 /// machines.
@@ -13,11 +13,62 @@ use super::srgb::{EIGHT, SIXTEEN, SrgbCodes};
 pub(crate) struct Conversion {
     curves: [ToneCurve; 3],
     matrix: Matrix,
+    /// The step from the light of the scene to that of the display, for HLG.
+    pub(super) ootf: Option<Ootf>,
+}
+
+/// The opto-optical transfer of HLG: from the light of the scene to that of the nominal display with a peak of 1000 cd/m² (BT.2100-2,
+/// table 5).
+#[derive(Debug)]
+pub(crate) struct Ootf {
+    /// Shares of the channels in the luminance.
+    luminance: [f64; 3],
+    /// Gain for equally spaced square roots of the luminance from 0 to 1. The square root spaces dark values as densely as the eye sees
+    /// them; interpolation changes light by less than a millionth of white.
+    gains: Vec<f64>,
+}
+
+impl Ootf {
+    /// Peak of the nominal display, in cd/m².
+    const PEAK_NITS: f64 = 1000.0;
+    /// Exponent of the luminance for that display.
+    const GAMMA: f64 = 1.2;
+    /// Number of gains, less one; chosen.
+    const STEPS: usize = 4096;
+
+    pub(super) fn new(luminance: [f64; 3]) -> Self {
+        Self {
+            luminance,
+            gains: (0..=Self::STEPS)
+                .map(|step| {
+                    let root = step as f64 / Self::STEPS as f64;
+                    Self::gain(root * root)
+                })
+                .collect(),
+        }
+    }
+
+    /// Factor from the light of the scene to that of the display in units of diffuse white. 1 of the scene is the peak.
+    fn gain(luminance: f64) -> f64 {
+        Self::PEAK_NITS / WHITE_NITS * libm::pow(luminance, Self::GAMMA - 1.0)
+    }
+
+    /// Light of the display in units of diffuse white.
+    fn displayed(&self, scene: [f64; 3]) -> [f64; 3] {
+        let [r, g, b] = self.luminance;
+        let luminance = r * scene[0] + g * scene[1] + b * scene[2];
+        let gain = interpolate(&self.gains, luminance.clamp(0.0, 1.0).sqrt());
+        scene.map(|light| light * gain)
+    }
 }
 
 impl Conversion {
     pub(super) fn new(curves: [ToneCurve; 3], matrix: Matrix) -> Self {
-        Self { curves, matrix }
+        Self {
+            curves,
+            matrix,
+            ootf: None,
+        }
     }
 
     /// True if the conversion changes each of 17 × 17 × 17 evenly spaced colours by at most one 8-bit code.
@@ -66,8 +117,17 @@ impl Conversion {
         }
     }
 
+    /// Linear light with the primaries of sRGB of one pixel, from the light of its codes. White is 1.
+    fn srgb_light(&self, lights: [f64; 3]) -> [f64; 3] {
+        let displayed = match &self.ootf {
+            None => lights,
+            Some(ootf) => ootf.displayed(lights),
+        };
+        times(self.matrix, displayed)
+    }
+
     /// The linear light of each code from 0 to `max`, per channel.
-    fn tables(&self, max: u32) -> [Vec<f64>; 3] {
+    pub(crate) fn tables(&self, max: u32) -> [Vec<f64>; 3] {
         self.curves.each_ref().map(|curve| {
             (0..=max)
                 .map(|code| curve.light(f64::from(code) / f64::from(max)))
@@ -75,8 +135,37 @@ impl Conversion {
         })
     }
 
+    /// The 8-bit sRGB codes of one pixel, from the light of its codes, and whether a channel is above white.
+    pub(crate) fn encode_8(&self, lights: [f64; 3]) -> ([u8; 3], bool) {
+        let light = self.srgb_light(lights);
+        let is_clipped = light.iter().any(|light| *light > 1.0 + Self::ROUNDING);
+        (light.map(|light| EIGHT.encode(light) as u8), is_clipped)
+    }
+
+    /// Rounding of light that does not count as above white (chosen).
+    const ROUNDING: f64 = 1e-3;
+
     /// The sRGB codes of the light of one pixel.
     fn encode(&self, lights: [f64; 3], codes: &SrgbCodes) -> [u32; 3] {
-        times(self.matrix, lights).map(|light| codes.encode(light))
+        self.srgb_light(lights).map(|light| codes.encode(light))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_gains_of_hlg_are_exact_enough() {
+        let ootf = Ootf::new([0.2627, 0.6780, 0.0593]);
+        for step in 0..=100_000 {
+            let scene = f64::from(step) / 100_000.0;
+            let [_, found, _] = ootf.displayed([scene; 3]);
+            let expected = scene * Ootf::gain(scene);
+            assert!(
+                (found - expected).abs() < 1e-6,
+                "{scene}: {found}, not {expected}"
+            );
+        }
     }
 }

@@ -4,13 +4,18 @@ use moxcms::ToneReprCurve;
 
 use super::srgb;
 
-/// A tone curve from values in [0, 1] to linear light in [0, 1].
+/// Luminance of diffuse white in HDR, which becomes the white of sRGB, in cd/m² (BT.2408-7, section 2.2).
+pub(super) const WHITE_NITS: f64 = 203.0;
+
+/// A tone curve from values in [0, 1] to linear light, in [0, 1] except for PQ.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum ToneCurve {
     /// The curve of sRGB.
     Srgb,
-    /// The curve of BT.709.
-    Bt709,
+    /// The curve of PQ (BT.2100-2, table 4), in units of [`WHITE_NITS`].
+    Pq,
+    /// The curve of HLG (BT.2100-2, table 5), to the light of the scene; 1 is the peak.
+    Hlg,
     /// A power function with this exponent.
     Gamma(f64),
     /// At least two equally spaced values of light, interpolated linearly.
@@ -55,11 +60,12 @@ impl ToneCurve {
         }))
     }
 
-    /// Linear light of a value in [0, 1], clamped to [0, 1].
+    /// Linear light of a value in [0, 1], clamped to [0, 1] except for PQ.
     pub(super) fn light(&self, value: f64) -> f64 {
         let light = match self {
             Self::Srgb => srgb::light(value),
-            Self::Bt709 => bt709(value),
+            Self::Pq => return pq(value) / WHITE_NITS,
+            Self::Hlg => hlg(value),
             Self::Gamma(gamma) => libm::pow(value, *gamma),
             Self::Table(values) => interpolate(values, value),
             Self::Segments([g, a, b, c, d, e, f]) => {
@@ -72,6 +78,44 @@ impl ToneCurve {
         };
         // NaN becomes 0, too.
         if light > 0.0 { light.min(1.0) } else { 0.0 }
+    }
+}
+
+impl ToneCurve {
+    /// True for a curve that profiles of BT.709 have: the inverse of the camera's curve, or the gamma of 1.961 that approximates it. Its
+    /// codes differ from that curve by at most one 8-bit sRGB code (chosen).
+    pub(super) fn is_video(&self) -> bool {
+        let is_near = |other: fn(f64) -> f64| {
+            (0..=64).map(|i| f64::from(i) / 64.0).all(|value| {
+                let [found, expected] = [self.light(value), other(value)]
+                    .map(|light| f64::from(srgb::SIXTEEN.encode(light)) / 257.0);
+                (found - expected).abs() <= 1.0
+            })
+        };
+        is_near(bt709) || is_near(|value| libm::pow(value, 1.961))
+    }
+}
+
+/// Luminance of a value of PQ, in cd/m² (BT.2100-2, table 4).
+fn pq(value: f64) -> f64 {
+    const M1: f64 = 2610.0 / 16_384.0;
+    const M2: f64 = 2523.0 / 32.0;
+    const C1: f64 = 3424.0 / 4096.0;
+    const C2: f64 = 2413.0 / 128.0;
+    const C3: f64 = 2392.0 / 128.0;
+    let power = libm::pow(value, 1.0 / M2);
+    10_000.0 * libm::pow((power - C1).max(0.0) / (C2 - C3 * power), 1.0 / M1)
+}
+
+/// Light of the scene of a value of HLG (BT.2100-2, table 5).
+fn hlg(value: f64) -> f64 {
+    const A: f64 = 0.178_832_77;
+    const B: f64 = 0.284_668_92;
+    const C: f64 = 0.559_910_73;
+    if value <= 0.5 {
+        value * value / 3.0
+    } else {
+        (libm::exp((value - C) / A) + B) / 12.0
     }
 }
 
@@ -146,5 +190,50 @@ mod tests {
         assert!(step.abs() < 1e-8, "{step}");
         // With the rounded constants 1.099 and 0.018 it is 0.25959.
         assert!((bt709(0.5) - 0.25959).abs() < 2e-4, "{}", bt709(0.5));
+    }
+
+    #[test]
+    fn curves_of_video_are_recognized() {
+        let camera = [1.0 / 0.45, 1.0 / 1.099, 0.099 / 1.099, 1.0 / 4.5, 0.081];
+        for (curve, expected) in [
+            (segments(&camera), true),
+            (table(&[502]), true),
+            (segments(&[1.961]), true),
+            (table(&[461]), false),
+            (table(&[563]), false),
+            (table(&[512]), false),
+            (
+                segments(&[2.4, 1.0 / 1.055, 0.055 / 1.055, 1.0 / 12.92, 0.04045]),
+                false,
+            ),
+        ] {
+            let found = ToneCurve::from_profile(&curve).unwrap();
+            assert_eq!(found.is_video(), expected, "{curve:?}");
+        }
+    }
+
+    /// PQ: SMPTE ST 2084, 0.508078 for 100 cd/m². HLG: half the signal is a twelfth of the peak.
+    #[test]
+    fn hdr_curves_have_the_values_of_their_standards() {
+        for (value, nits) in [
+            (0.0, 0.0),
+            (0.508_078, 100.0),
+            (0.751_827, 1000.0),
+            (1.0, 10_000.0),
+        ] {
+            assert!(
+                (pq(value) - nits).abs() <= nits * 1e-4,
+                "{value}: {}",
+                pq(value)
+            );
+        }
+        for (value, light) in [
+            (0.0, 0.0),
+            (0.5, 1.0 / 12.0),
+            (0.500_001, 1.0 / 12.0),
+            (1.0, 1.0),
+        ] {
+            assert!((hlg(value) - light).abs() < 1e-5, "{value}: {}", hlg(value));
+        }
     }
 }

@@ -16,6 +16,8 @@ pub(super) struct Profile {
     pub(super) conversion: Conversion,
     /// True for a grey profile.
     pub(super) is_grey: bool,
+    /// True if the profile has the curve of video cameras. It is replaced by that of sRGB, because codes of video are taken as displayed.
+    pub(super) is_video: bool,
 }
 
 impl Profile {
@@ -69,10 +71,17 @@ impl Profile {
         if numbers.iter().any(|number| !number.is_finite()) || numbers.iter().all(|n| *n == 0.0) {
             return Err(missing(&name, "matrix"));
         }
+        let is_video = curves.iter().all(ToneCurve::is_video);
+        let curves = if is_video {
+            [ToneCurve::Srgb, ToneCurve::Srgb, ToneCurve::Srgb]
+        } else {
+            curves
+        };
         Ok(Self {
             name,
             conversion: Conversion::new(curves, matrix),
             is_grey,
+            is_video,
         })
     }
 }
@@ -115,6 +124,20 @@ fn tone_curve(name: &str, curve: Option<&ToneReprCurve>) -> Result<ToneCurve, St
 fn parse(bytes: &[u8]) -> Result<ColorProfile, String> {
     ColorProfile::new_from_slice(bytes)
         .map_err(|e| format!("the ICC profile is broken: {}", readable(&e.to_string())))
+}
+
+/// The code points of H.273 in a profile for RGB (ICC.1:2022, section 9.2.17): primaries, transfer, matrix and range.
+pub(super) fn code_points(profile: &[u8]) -> Option<[u8; 4]> {
+    if four_bytes(profile, 16)? != *b"RGB " {
+        return None;
+    }
+    let tags = u32::from_be_bytes(four_bytes(profile, 128)?) as usize;
+    let entry = (0..tags.min(profile.len() / 12))
+        .map(|tag| 132 + 12 * tag)
+        .find(|entry| four_bytes(profile, *entry).as_ref() == Some(b"cicp"))?;
+    let start = u32::from_be_bytes(four_bytes(profile, entry + 4)?) as usize;
+    // The type and four reserved bytes come first.
+    four_bytes(profile, start.checked_add(8)?)
 }
 
 /// Fields of a profile that decide if it is supported.

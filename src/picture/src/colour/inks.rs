@@ -38,7 +38,7 @@ impl Inks {
     /// If the profile is not for CMYK, or is broken. The message names the profile and the flag that ignores it.
     pub(crate) fn new(tag: &ColourTag, rule: ColourRule) -> Result<Self, String> {
         match (tag, rule) {
-            (ColourTag::Profile(profile), ColourRule::Convert) => {
+            (ColourTag::Profile(profile), ColourRule::Convert | ColourRule::Clip) => {
                 cached_profile(profile).map(Self::Profile)
             }
             (ColourTag::Profile(_), ColourRule::Ignore) => {

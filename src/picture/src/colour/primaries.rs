@@ -47,11 +47,70 @@ impl Primaries {
         white: [0.3127, 0.3290],
     };
 
+    /// Primaries of BT.2020, table 3.
+    pub(super) const BT2020: Self = Self {
+        red: [0.708, 0.292],
+        green: [0.170, 0.797],
+        blue: [0.131, 0.046],
+        white: [0.3127, 0.3290],
+    };
+
+    /// Primaries of digital cinema (SMPTE RP 431-2).
+    pub(super) const DCI_P3: Self = Self {
+        white: [0.314, 0.351],
+        ..Self::DISPLAY_P3
+    };
+
+    /// Primaries of NTSC of 1953 (BT.470, system M), with illuminant C.
+    pub(super) const BT470_M: Self = Self {
+        red: [0.67, 0.33],
+        green: [0.21, 0.71],
+        blue: [0.14, 0.08],
+        white: [0.310, 0.316],
+    };
+
+    /// Primaries of PAL and SECAM (BT.470, systems B and G; BT.601 of 625 lines).
+    pub(super) const BT470_BG: Self = Self {
+        green: [0.29, 0.60],
+        ..Self::SRGB
+    };
+
+    /// Primaries of NTSC (SMPTE 170M and 240M; BT.601 of 525 lines).
+    pub(super) const SMPTE_170M: Self = Self {
+        red: [0.630, 0.340],
+        green: [0.310, 0.595],
+        blue: [0.155, 0.070],
+        white: [0.3127, 0.3290],
+    };
+
+    /// Primaries of film with illuminant C (H.273, table 2, number 8).
+    pub(super) const FILM: Self = Self {
+        red: [0.681, 0.319],
+        green: [0.243, 0.692],
+        blue: [0.145, 0.049],
+        white: [0.310, 0.316],
+    };
+
+    /// Primaries of EBU Tech. 3213 (H.273, table 2, number 22).
+    pub(super) const EBU_3213: Self = Self {
+        red: [0.630, 0.340],
+        green: [0.295, 0.605],
+        blue: [0.155, 0.077],
+        white: [0.3127, 0.3290],
+    };
+
+    /// Shares of red, green and blue in the luminance of white.
+    pub(super) fn luminance(self) -> [f64; 3] {
+        // Each column has luminance 1.
+        let columns = transpose([self.red, self.green, self.blue].map(xyz_from_xy));
+        times(inverse(columns), xyz_from_xy(self.white))
+    }
+
     /// The matrix from linear light with these primaries to XYZ, with white adapted to D50.
     fn to_xyz(self) -> Matrix {
         let columns = transpose([self.red, self.green, self.blue].map(xyz_from_xy));
         let white = xyz_from_xy(self.white);
-        let amounts = times(inverse(columns), white);
+        let amounts = self.luminance();
         let scaled = columns.map(|row| [0, 1, 2].map(|i| row[i] * amounts[i]));
         let (from, to) = (times(BRADFORD, white), times(BRADFORD, D50));
         let scale = [0, 1, 2].map(|i| BRADFORD[i].map(|value| value * to[i] / from[i]));
@@ -135,6 +194,21 @@ mod tests {
             [-0.019_637_6, -0.078_636_1, 1.098_273_6],
         ];
         assert_close(Primaries::DISPLAY_P3.to_srgb(), expected, 1e-5);
+    }
+
+    /// BT.2087-0, table 2 (inverse), and BT.2020-2, table 4.
+    #[test]
+    fn bt2020_has_the_matrix_and_luminance_of_its_standards() {
+        let expected = [
+            [1.660_5, -0.587_6, -0.072_8],
+            [-0.124_6, 1.132_9, -0.008_3],
+            [-0.018_2, -0.100_6, 1.118_7],
+        ];
+        assert_close(Primaries::BT2020.to_srgb(), expected, 1e-4);
+        let shares = Primaries::BT2020.luminance();
+        for (share, expected) in shares.iter().zip([0.2627, 0.6780, 0.0593]) {
+            assert!((share - expected).abs() < 1e-4, "{shares:?}");
+        }
     }
 
     #[test]

@@ -18,6 +18,16 @@ const P3: [u32; 8] = [
     31_270, 32_900, 68_000, 32_000, 26_500, 69_000, 15_000, 6_000,
 ];
 
+const ADOBE_RGB: [u32; 8] = [
+    31_270, 32_900, 64_000, 33_000, 21_000, 71_000, 15_000, 6_000,
+];
+const BT2020: [u32; 8] = [
+    31_270, 32_900, 70_800, 29_200, 17_000, 79_700, 13_100, 4_600,
+];
+const SMPTE_170M: [u32; 8] = [
+    31_270, 32_900, 63_000, 34_000, 31_000, 59_500, 15_500, 7_000,
+];
+
 #[test]
 fn gamma_and_primaries_of_srgb_are_srgb() {
     let rounded = [
@@ -29,6 +39,11 @@ fn gamma_and_primaries_of_srgb_are_srgb() {
         (None, Some(SRGB)),
         (Some(45_405), None),
         (Some(45_505), Some(rounded)),
+        // BT.709 and SMPTE 170M, as ffmpeg up to version 7 writes them.
+        (Some(50_994), None),
+        (Some(50_994), Some(SRGB)),
+        (Some(50_994), Some(SMPTE_170M)),
+        (None, Some(SMPTE_170M)),
     ] {
         assert!(is_srgb(&gamma(exponent, primaries)), "{exponent:?}");
     }
@@ -36,9 +51,10 @@ fn gamma_and_primaries_of_srgb_are_srgb() {
         (Some(45_404), None, "is 0.45404; 0.45455 (sRGB) expected"),
         (Some(45_506), None, "is 0.45506"),
         (Some(55_556), Some(SRGB), "is 0.55556"),
-        (Some(100_000), None, "is 1; 0.45455"),
-        (Some(45_455), Some(P3), "red 0.68, 0.32"),
-        (None, Some(P3), "cHRM"),
+        (Some(100_000), None, "linear light in 8 bits"),
+        (Some(45_455), Some(ADOBE_RGB), "green 0.21, 0.71"),
+        (None, Some(P3), "Display P3, but no transfer"),
+        (None, Some(BT2020), "may be HDR"),
     ] {
         let problem = gamma(exponent, primaries)
             .meaning(CodeDepth::Eight)
@@ -60,23 +76,42 @@ fn linear_light_needs_16_bits() {
     assert!(of_p3.meaning(CodeDepth::Sixteen).is_err());
 }
 
+/// The name and handling of a colour space that is converted.
+fn space(tag: &ColourTag) -> (String, ColourHandling) {
+    let Ok(Meaning::Other(space)) = tag.meaning(CodeDepth::Eight) else {
+        panic!("{tag:?}")
+    };
+    let note = space.note(space.handling);
+    assert_eq!(note.profile, None);
+    (note.from, note.handling)
+}
+
 #[test]
 fn code_points_are_converted_or_refused_by_name() {
-    assert!(is_srgb(&ColourTag::CodePoints([1, 13, 0, 1])));
-    for (points, name) in [([1, 1, 0, 1], "BT.709"), ([12, 13, 0, 1], "Display P3")] {
-        let Ok(Meaning::Other(space)) = ColourTag::CodePoints(points).meaning(CodeDepth::Eight)
-        else {
-            panic!("{name}")
-        };
-        let note = space.note(ColourHandling::Converted);
-        assert_eq!((&*note.from, note.profile), (name, None));
+    for points in [
+        [1, 13, 0, 1],
+        [1, 1, 0, 1],
+        [6, 6, 0, 1],
+        [5, 1, 0, 1],
+        [2, 2, 0, 1],
+    ] {
+        assert!(is_srgb(&ColourTag::CodePoints(points)), "{points:?}");
+    }
+    for (points, name, handling) in [
+        ([12, 13, 0, 1], "Display P3", ColourHandling::Converted),
+        ([12, 1, 0, 1], "Display P3", ColourHandling::Video),
+        ([9, 1, 0, 1], "BT.2020", ColourHandling::Video),
+        ([9, 16, 0, 1], "PQ (HDR), BT.2020", ColourHandling::Clipped),
+        ([9, 18, 0, 1], "HLG (HDR), BT.2020", ColourHandling::Clipped),
+    ] {
+        let found = space(&ColourTag::CodePoints(points));
+        assert_eq!(found, (name.to_owned(), handling));
     }
     for (points, expected) in [
-        ([9, 16, 0, 1], "PQ"),
-        ([9, 18, 0, 1], "HLG"),
         ([1, 13, 0, 0], "narrow range"),
         ([12, 13, 0, 0], "narrow range"),
-        ([9, 1, 0, 1], "9/1/0/1 (cICP)"),
+        ([9, 16, 9, 0], "narrow range"),
+        ([9, 2, 0, 1], "may be HDR (cICP 9/2)"),
         ([1, 13, 1, 1], "1/13/1/1 (cICP)"),
     ] {
         let problem = ColourTag::CodePoints(points)
@@ -89,31 +124,19 @@ fn code_points_are_converted_or_refused_by_name() {
     }
 }
 
-/// Black and white stay; other BT.709 codes become the sRGB codes of the same light.
+/// ffmpeg 5.1 writes `gAMA` and `cHRM`, ffmpeg 7 also `cICP`.
 #[test]
-fn bt709_codes_are_converted_to_srgb() {
-    let Ok(Meaning::Other(space)) = ColourTag::CodePoints([1, 1, 0, 1]).meaning(CodeDepth::Eight)
-    else {
-        panic!("BT.709")
-    };
-    let mut samples = [0, 255, 128, 10, 20, 200];
-    space.conversion.convert_8(&mut samples);
-    let expected = [0, 255, 128, 10, 20, 200].map(|code: u8| {
-        let value = f64::from(code) / 255.0;
-        let light = if value < 0.081 {
-            value / 4.5
-        } else {
-            ((value + 0.099) / 1.099).powf(1.0 / 0.45)
-        };
-        let value = if light <= 0.003_130_8 {
-            12.92 * light
-        } else {
-            1.055 * light.powf(1.0 / 2.4) - 0.055
-        };
-        (255.0 * value).round() as u8
-    });
-    assert_eq!(samples, expected);
-    assert_ne!(samples, [0, 255, 128, 10, 20, 200]);
+fn gamma_and_primaries_are_what_code_points_are() {
+    for (exponent, primaries, points) in [
+        (50_994, BT2020, [9, 1, 0, 1]),
+        (50_994, P3, [12, 1, 0, 1]),
+        (45_455, P3, [12, 13, 0, 1]),
+        (35_714, SRGB, [1, 5, 0, 1]),
+        (35_714, BT2020, [9, 5, 0, 1]),
+    ] {
+        let stated = gamma(Some(exponent), Some(primaries));
+        assert_eq!(space(&stated), space(&ColourTag::CodePoints(points)));
+    }
 }
 
 /// An ICC profile with this colour space, connection space and one empty tag.
@@ -159,4 +182,23 @@ fn unsupported_profiles_are_refused_by_name() {
             .unwrap_err();
         assert!(problem.contains("cannot be decompressed"), "{problem}");
     }
+}
+
+/// A profile of tables with the code points of PQ, as programs write it for HDR.
+#[test]
+fn an_hdr_profile_counts_by_its_code_points() {
+    let mut profile = profile_header([b"RGB ", b"Lab ", b"cicp"]);
+    let start = profile.len() as u32;
+    profile[136..140].copy_from_slice(&start.to_be_bytes());
+    profile.extend(b"cicp\0\0\0\0");
+    let with = |points: [u8; 4]| ColourTag::Profile([&profile[..], &points].concat());
+    let found = space(&with([9, 16, 0, 1]));
+    assert_eq!(found.0, "PQ (HDR), BT.2020");
+    // Other profiles count by their curves.
+    assert!(with([1, 13, 0, 1]).meaning(CodeDepth::Eight).is_err());
+    assert!(
+        ColourTag::Profile(profile)
+            .meaning(CodeDepth::Eight)
+            .is_err()
+    );
 }

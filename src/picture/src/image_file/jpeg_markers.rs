@@ -18,7 +18,7 @@ const APP2: u8 = 0xE2;
 const APP14: u8 = 0xEE;
 
 /// Marker before the coded samples (SOS). No headers follow it.
-const START_OF_SCAN: u8 = 0xDA;
+pub(super) const START_OF_SCAN: u8 = 0xDA;
 
 /// Facts in the headers of a JPEG file (ITU-T T.81, annex B).
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -74,7 +74,7 @@ pub(super) fn has_end(file: &[u8]) -> bool {
 const END: u8 = 0xD9;
 
 /// Iterator over the markers of a file with their segments, up to the end marker or the end of a truncated file.
-struct Segments<'a>(&'a [u8]);
+pub(super) struct Segments<'a>(pub(super) &'a [u8]);
 
 impl<'a> Iterator for Segments<'a> {
     type Item = (u8, &'a [u8]);

@@ -224,7 +224,10 @@ fn unconvertible_profile_is_refused_or_ignored() {
         (with(*b"cICP", &[9, 18, 0, 1]), "HLG"),
         (with(*b"cICP", &[1, 13, 0, 0]), "narrow range"),
         (with(*b"gAMA", &55_556_u32.to_be_bytes()), "0.55556"),
-        (with(*b"gAMA", &100_000_u32.to_be_bytes()), "gAMA"),
+        (
+            with(*b"gAMA", &100_000_u32.to_be_bytes()),
+            "linear light in 8 bits",
+        ),
         (png_with_profile(&image, &cut), "ICC profile"),
         (
             jpeg_with_profile(&jpeg(&image), b"no profile"),

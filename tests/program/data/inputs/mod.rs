@@ -5,3 +5,4 @@ mod depth;
 mod formats;
 mod light;
 mod orientation;
+mod video_colours;

@@ -431,3 +431,50 @@ fn enhance_prints_adapted_sizes() {
     2 images: resized to 32 × 32 and back
     ");
 }
+
+/// A gain that suits L3 burns L1 out.
+#[test]
+fn burnt_out_images_are_named() {
+    let sidecar = "range_in = \"0..1\"\nrange_out = \"0..1\"\n";
+    let bench = bench(&onnx::gain(5.0), sidecar);
+    let rooms: Vec<String> = ["L1", "L3"]
+        .into_iter()
+        .map(|level| {
+            let line = format!("synthesize rooms --levels {level} --variant ev --out {level}");
+            bench.complete(&words(&line));
+            let folders = fs::read_dir(bench.path(level)).unwrap();
+            let folders = folders.map(|folder| folder.unwrap().path().display().to_string());
+            // The images of the rooms have the same name.
+            folders.min().unwrap()
+        })
+        .collect();
+    let enhance = |model: &str, images: &str, out: &str| {
+        let called = bench.call(&words(&format!("enhance {model} {images} --out {out}")));
+        called.ended(0).stderr
+    };
+    let said = enhance("model.onnx", &rooms[0], "bright");
+    assert!(said.contains("model: 1 of 1 image is burnt out"), "{said}");
+    assert_eq!(enhance("model.onnx", &rooms[1], "dark"), "");
+    assert_eq!(enhance("lift", &rooms[0], "lifted"), "");
+    let doctor = bench.call(&words("enhance doctor model.onnx rooms --out doctor"));
+    let said = "Brighter images are burnt out, with codes of 254 or 255 where the dark ones have detail: 3 of 3 as they are";
+    assert!(doctor.stdout.contains(said), "{doctor:?}");
+    let doctor = bench.call(&words("enhance doctor lift rooms --out doctor"));
+    assert!(!doctor.stdout.contains("burnt"), "{doctor:?}");
+
+    let line = "--model random --data rooms --levels L1,L3 --variant ev --limit 9 --llie model.onnx --llie lift --llie-on ev --out run";
+    let called = bench.call(&words(line));
+    assert_eq!(called.code, Some(0), "{called:?}");
+    let manifest = manifest(&bench);
+    let burnt = manifest["enhancers"]["model"]["burnt_out"]
+        .as_object()
+        .unwrap();
+    assert_eq!(burnt.keys().collect::<Vec<_>>(), ["L1-ev+model"]);
+    assert_eq!(manifest["enhancers"]["lift"].get("burnt_out"), None);
+    let report = bench.call(&words("report run --full"));
+    assert!(
+        report.stdout.contains("! model: images are burnt out"),
+        "{report:?}"
+    );
+    assert!(!report.stdout.contains("! lift: images"), "{report:?}");
+}

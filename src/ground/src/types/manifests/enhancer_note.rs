@@ -36,6 +36,20 @@ pub struct EnhancerNote {
     /// Flaws of the images enhanced during the run.
     #[serde(default)]
     pub judged: JudgedImages,
+    /// Burnt-out images of the run, by condition.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub burnt_out: BTreeMap<String, BurntOutImages>,
+}
+
+/// Burnt-out images of one condition: most of their pixels are white, although those of the degraded images differ.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct BurntOutImages {
+    /// The number of images.
+    pub images: usize,
+    /// The sum of their percentages of white pixels.
+    pub percents: usize,
+    /// The first of their frames by name.
+    pub example: String,
 }
 
 /// One convention for a model's input or output.
@@ -107,11 +121,25 @@ impl EnhancerNote {
         Some(&line.value)
     }
 
+    /// Counts a burnt-out image of a frame and condition, with its percentage of white pixels.
+    pub fn count_burnt_out(&mut self, frame: String, condition: String, white: u8) {
+        let found = BurntOutImages {
+            images: 1,
+            percents: white.into(),
+            example: frame,
+        };
+        self.burnt_out.entry(condition).or_default().add(&found);
+    }
+
     /// Merges the note of an earlier session of the run into this one.
     #[must_use]
     pub fn with_earlier(mut self, earlier: Option<Self>) -> Self {
         let Some(earlier) = earlier else { return self };
         self.judged.add(&earlier.judged);
+        for (condition, images) in &earlier.burnt_out {
+            let all = self.burnt_out.entry(condition.clone()).or_default();
+            all.add(images);
+        }
         self.resized |= earlier.resized;
         self.probe = self.probe.or(earlier.probe);
         for remark in earlier.remarks {
@@ -127,6 +155,18 @@ impl EnhancerNote {
             self.sizes = self.size_counts.summary();
         }
         self
+    }
+}
+
+impl BurntOutImages {
+    /// Adds other images of the same condition.
+    fn add(&mut self, other: &Self) {
+        self.images += other.images;
+        self.percents += other.percents;
+        // The first by name, so that the example does not depend on the order of the images.
+        if self.example.is_empty() || other.example < self.example {
+            self.example.clone_from(&other.example);
+        }
     }
 }
 
@@ -204,6 +244,25 @@ mod tests {
             size_counts: counts,
             ..EnhancerNote::default()
         }
+    }
+
+    #[test]
+    fn burnt_out_images_of_all_sessions_are_counted() {
+        let note = |frames: &[(&str, u8)]| {
+            let mut note = EnhancerNote::default();
+            for (frame, white) in frames {
+                note.count_burnt_out((*frame).to_owned(), "L1+ev+m".to_owned(), *white);
+            }
+            note
+        };
+        let both = note(&[("c", 97), ("b", 60)]).with_earlier(Some(note(&[("a", 80)])));
+        assert_eq!(
+            both.burnt_out,
+            note(&[("a", 80), ("b", 60), ("c", 97)]).burnt_out
+        );
+        assert_eq!(both.burnt_out["L1+ev+m"].example, "a");
+        let plain = serde_json::to_value(EnhancerNote::default()).unwrap();
+        assert_eq!(plain.get("burnt_out"), None);
     }
 
     #[test]

@@ -65,6 +65,10 @@ pub struct ColourNote {
 pub enum ColourHandling {
     /// They were converted to sRGB.
     Converted,
+    /// Their primaries were converted to those of sRGB. The codes are of video, whose curve counts as that of sRGB.
+    Video,
+    /// They are HDR, and were converted to sRGB, where light above diffuse white is clipped.
+    Clipped,
     /// Their codes were taken as sRGB.
     Ignored,
 }
@@ -77,8 +81,12 @@ impl InputNote {
         let colour = self
             .colour
             .as_ref()
-            .filter(|colour| colour.handling == ColourHandling::Converted)
-            .map(|_| format!("colour {COLOUR_VERSION}"));
+            .and_then(|colour| match colour.handling {
+                ColourHandling::Converted => Some(format!("colour {COLOUR_VERSION}")),
+                ColourHandling::Video => Some(format!("video colour {COLOUR_VERSION}")),
+                ColourHandling::Clipped => Some(format!("clipped colour {COLOUR_VERSION}")),
+                ColourHandling::Ignored => None,
+            });
         let depth = self.depth.map(|depth| depth.words().to_owned());
         let exposure = self.exposure_ev.map(|ev| format!("exposure {ev}"));
         let parts: Vec<String> = [orientation, colour, depth, exposure]
@@ -103,6 +111,8 @@ impl InputNote {
         if let Some(colour) = &self.colour {
             let remark = match colour.handling {
                 ColourHandling::Converted => Remark::Converted,
+                ColourHandling::Video => Remark::ConvertedVideo,
+                ColourHandling::Clipped => Remark::Clipped,
                 ColourHandling::Ignored => Remark::NotConverted,
             };
             remarks.push((remark, colour.from.clone()));
@@ -141,6 +151,10 @@ pub(super) enum Remark {
     FirstOfSeveral,
     /// Converted to sRGB.
     Converted,
+    /// Converted to the primaries of sRGB, with codes of video.
+    ConvertedVideo,
+    /// HDR, converted to sRGB.
+    Clipped,
     /// Interpreted as sRGB, although the file states another colour space.
     NotConverted,
     /// Kept in more than 8 bits.
@@ -161,6 +175,12 @@ impl Remark {
             }
             Self::FirstOfSeveral => "the first picture of a file with several",
             Self::Converted => "converted to sRGB",
+            Self::ConvertedVideo => {
+                "converted to the primaries of sRGB, with codes of video taken as displayed"
+            }
+            Self::Clipped => {
+                "converted to sRGB by --decode colour=clip, where light above 203 cd/m² becomes white"
+            }
             Self::NotConverted => {
                 "taken as sRGB, because of --decode colour=ignore, although the file states other colours"
             }
