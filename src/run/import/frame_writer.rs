@@ -40,6 +40,8 @@ pub(super) struct ChosenFrame {
     pub(super) name: String,
     pub(super) place: Place,
     pub(super) log_time: Nanoseconds,
+    /// Further facts for its line in `frames.jsonl`.
+    pub(super) facts: Map<String, Value>,
     pub(super) source: FrameSource,
 }
 
@@ -50,13 +52,15 @@ pub(super) enum FrameSource {
         channel: Arc<Channel>,
         bytes: Vec<u8>,
     },
+    /// An image file.
+    File(Vec<u8>),
     Image(Rgb),
 }
 
 impl ChosenFrame {
     fn bytes(&self) -> usize {
         match &self.source {
-            FrameSource::Message { bytes, .. } => bytes.len(),
+            FrameSource::Message { bytes, .. } | FrameSource::File(bytes) => bytes.len(),
             FrameSource::Image(image) => image.samples().len(),
         }
     }
@@ -189,6 +193,7 @@ impl<'a> FrameWriter<'a> {
             FrameSource::Message { channel, bytes } => {
                 self.encode_message(frame, channel, bytes)?
             }
+            FrameSource::File(bytes) => self.encode_file(frame, bytes.clone(), "unknown")?,
             FrameSource::Image(image) => EncodedFrame {
                 bytes: crate::picture::png(image).map_err(|e| e.to_string())?,
                 ending: "png",
@@ -215,6 +220,7 @@ impl<'a> FrameWriter<'a> {
         if !encoded.frame_id.is_empty() {
             line.insert("frame_id".to_owned(), json!(encoded.frame_id));
         }
+        line.extend(frame.facts.clone());
         Ok(WrittenFrame {
             topic: frame.topic.clone(),
             time: frame.place.time,
@@ -247,32 +253,43 @@ impl<'a> FrameWriter<'a> {
                     frame_id: message.frame_id,
                 })
             }
-            MessageImage::File { format, bytes } => {
-                let file = ImageFile::new(bytes.into_owned(), frame.words(), DecodeRule::default());
-                let ending = file.extension();
-                if !COPIED.contains(&ending) {
-                    return Err(format!(
-                        "format {:?}; a JPEG, PNG or WebP file expected",
-                        excerpt(&format, 60)
-                    ));
-                }
-                // Only the problem, because the caller adds the place.
-                let (width, height) = file.check().map_err(|e| match e {
-                    Error::Data { problem, .. } => problem,
-                    other => other.to_string(),
-                })?;
-                let note = file.note();
-                self.tally.add(&FrameId(frame.words()), &note);
-                Ok(EncodedFrame {
-                    size: (width as usize, height as usize),
-                    is_turned: note.orientation.is_some(),
-                    peak_16: None,
-                    ending,
-                    bytes: file.bytes().to_vec(),
-                    frame_id: message.frame_id,
-                })
-            }
+            MessageImage::File { format, bytes } => Ok(EncodedFrame {
+                frame_id: message.frame_id,
+                ..self.encode_file(frame, bytes.into_owned(), &format)?
+            }),
         }
+    }
+
+    /// Checks an image file that is copied unchanged. `format` is its stated format.
+    fn encode_file(
+        &self,
+        frame: &ChosenFrame,
+        bytes: Vec<u8>,
+        format: &str,
+    ) -> Result<EncodedFrame, String> {
+        let file = ImageFile::new(bytes, frame.words(), DecodeRule::default());
+        let ending = file.extension();
+        if !COPIED.contains(&ending) {
+            return Err(format!(
+                "format {:?}; a JPEG, PNG or WebP file expected",
+                excerpt(format, 60)
+            ));
+        }
+        // Only the problem, because the caller adds the place.
+        let (width, height) = file.check().map_err(|e| match e {
+            Error::Data { problem, .. } => problem,
+            other => other.to_string(),
+        })?;
+        let note = file.note();
+        self.tally.add(&FrameId(frame.words()), &note);
+        Ok(EncodedFrame {
+            size: (width as usize, height as usize),
+            is_turned: note.orientation.is_some(),
+            peak_16: None,
+            ending,
+            bytes: file.bytes().to_vec(),
+            frame_id: String::new(),
+        })
     }
 
     /// Writes the waiting frames and the files about all frames, with `info` as `dataset.json`. Returns the number of scenes.
@@ -355,12 +372,12 @@ fn parse<'a>(channel: &Channel, bytes: &'a [u8]) -> Result<ImageMessage<'a>, Str
     }
 }
 
-/// The line about the written frames and scenes. `stretch` is the duration of a scene in seconds, `seen` the number of frames read.
+/// The line about the written frames and scenes. `extent` is that of a scene, such as `30 s`, `seen` the number of frames read.
 pub(super) fn summary(
     out: &Path,
     frames: usize,
     scenes: usize,
-    stretch: f64,
+    extent: &str,
     seen: usize,
     failed: usize,
 ) -> String {
@@ -375,7 +392,7 @@ pub(super) fn summary(
         format!(", chosen from {seen}")
     };
     format!(
-        "{}: {} of {} ({stretch} s each){chosen}{failed}\n",
+        "{}: {} of {} ({extent} each){chosen}{failed}\n",
         out.display(),
         counted(frames, "frame"),
         counted(scenes, "scene"),

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use clap::Args;
+use serde_json::Map;
 
 use super::frame_writer::{ChosenFrame, FrameSource, FrameWriter, summary};
 use super::recording::{WrittenArgs, drive_name, warn_of_missed};
@@ -75,6 +76,7 @@ pub(crate) fn import(args: &VideoArgs, progress: &Progress) -> Result<Outcome> {
         let frame = match frames.next() {
             Ok(Some(frame)) => frame,
             Ok(None) => break,
+            Err(e @ Error::Usage { .. }) => return Err(e),
             Err(e) => {
                 problem = Some(e);
                 break;
@@ -94,6 +96,7 @@ pub(crate) fn import(args: &VideoArgs, progress: &Progress) -> Result<Outcome> {
                 name,
                 place,
                 log_time: frame.time,
+                facts: Map::new(),
                 source: FrameSource::Image(frame.image),
             };
             writer.push(frame, true);
@@ -119,7 +122,7 @@ pub(crate) fn import(args: &VideoArgs, progress: &Progress) -> Result<Outcome> {
         out,
         writer.written.len(),
         scenes,
-        args.written.stretch,
+        &format!("{} s", args.written.stretch),
         seen,
         failed,
     );

@@ -26,27 +26,8 @@ impl Tree {
     /// # Errors
     /// If the cache does not name a snapshot.
     pub(super) fn from_folder(place: &Path) -> Result<Self> {
-        let canonical = place.canonicalize().unwrap_or_else(|_| place.to_owned());
-        if !(is_cached_repository(&canonical) && place.join("snapshots").is_dir()) {
-            let repository = canonical
-                .ancestors()
-                .nth(2)
-                .filter(|path| is_cached_repository(path));
-            return Ok(Self::Folder {
-                folder: place.to_owned(),
-                blobs: repository.map(|path| path.join("blobs")),
-            });
-        }
-        let head = reading::text(&place.join("refs/main"))?;
-        let snapshot = place.join("snapshots").join(head.trim());
-        if !snapshot.is_dir() || head.trim().contains(['/', '\\']) {
-            let problem = "refs/main names no folder in snapshots; download the repository again";
-            return Err(Error::data(place.display(), problem));
-        }
-        Ok(Self::Folder {
-            folder: snapshot,
-            blobs: Some(place.join("blobs")),
-        })
+        let (folder, blobs) = cached_snapshot(place)?;
+        Ok(Self::Folder { folder, blobs })
     }
 
     /// Path of the folder or the ZIP file.
@@ -111,6 +92,30 @@ impl Tree {
     pub(super) fn full_path(&self, path: &Path) -> PathBuf {
         self.place().join(path)
     }
+}
+
+/// The folder itself, or the newest snapshot if the folder is a repository in a hub's cache; and the folder of the cache with the files
+/// that the links in a snapshot lead to.
+///
+/// # Errors
+/// If the cache does not name a snapshot.
+pub(crate) fn cached_snapshot(place: &Path) -> Result<(PathBuf, Option<PathBuf>)> {
+    let canonical = place.canonicalize().unwrap_or_else(|_| place.to_owned());
+    if !(is_cached_repository(&canonical) && place.join("snapshots").is_dir()) {
+        let repository = canonical
+            .ancestors()
+            .nth(2)
+            .filter(|path| is_cached_repository(path));
+        let blobs = repository.map(|path| path.join("blobs"));
+        return Ok((place.to_owned(), blobs));
+    }
+    let head = reading::text(&place.join("refs/main"))?;
+    let snapshot = place.join("snapshots").join(head.trim());
+    if !snapshot.is_dir() || head.trim().contains(['/', '\\']) {
+        let problem = "refs/main names no folder in snapshots; download the repository again";
+        return Err(Error::data(place.display(), problem));
+    }
+    Ok((snapshot, Some(place.join("blobs"))))
 }
 
 fn is_cached_repository(path: &Path) -> bool {
