@@ -107,7 +107,7 @@
 //! of one trial: one question to one model in one condition. The modules of this crate:
 //!
 //! - `dataset`: a folder, a ready-made set or the built-in rooms → images, their maps and questions.
-//! - `import`: other data sets → frames, one file a kind; `import/recording`: recordings of robots and videos → frames.
+//! - `import`: other data sets → frames, one file a kind; `import/recording`, `import/lerobot`: recordings of robots and videos → frames.
 //! - `calibrate`: frames of a sensor → the camera that the synthesis takes its noise from.
 //! - `ask`: a prompt and images → a reply; the only asynchronous stage. `ask/wire`: the APIs of endpoints, their requests and replies.
 //! - `image_store`: a folder of images that were made, shared by runs and processes; it may be deleted at any time.

@@ -11,6 +11,7 @@ pub(crate) mod frame_folder;
 pub(crate) mod frames;
 pub(crate) mod image_paths;
 mod image_source;
+mod import_hint;
 pub(crate) mod inputs;
 mod label_folders;
 pub(crate) mod maps;
@@ -42,12 +43,13 @@ use frame_facts::FrameFacts;
 pub(crate) use frame_facts::FrameFiles;
 use frames::MissingFiles;
 pub(crate) use image_source::ImageSource;
+use import_hint::with_import_hint;
 use maps::MapPaths;
 pub(crate) use photographs::Photographs;
 pub(crate) use picture::Picture;
 pub use ready_made::SetArgs;
-pub(crate) use ready_made::SkipBad;
 use ready_made::{FileQuestions, LEFT_OUT, RowCounts, SceneNames, Series, SetFormat};
+pub(crate) use ready_made::{ParquetColumns, SkipBad, cached_snapshot, refuse_lfs_pointer};
 pub(crate) use root::Root;
 pub(crate) use root::RootArgs;
 pub(crate) use scene_args::SceneArgs;
@@ -338,6 +340,10 @@ impl Dataset {
     /// The built-in rooms, and a folder of frames with maps but no questions, have no questions yet: the caller generates
     /// them from [`Self::labels`] and adds them with [`Self::with_questions`].
     pub fn open(place: &DataPlace, questions: Option<&Path>, set: &SetArgs) -> Result<Self> {
+        Self::open_place(place, questions, set).map_err(|e| with_import_hint(place.path(), e))
+    }
+
+    fn open_place(place: &DataPlace, questions: Option<&Path>, set: &SetArgs) -> Result<Self> {
         let dataset = match place {
             DataPlace::Rooms(rooms) => {
                 let rooms = Self::from_rooms(*rooms);

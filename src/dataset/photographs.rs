@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::frames::MissingFiles;
 use super::image_paths::{ImagePaths, is_image};
+use super::import_hint::with_import_hint;
 use super::{DataPlace, Dataset, Root, SetArgs, frames, stem};
 use crate::error::{Error, Result};
 use crate::picture::image_file::format::SUPPORTED_FORMATS;
@@ -32,7 +33,9 @@ impl Photographs {
     pub(crate) fn open(place: &DataPlace, set: &SetArgs) -> Result<Self> {
         let dataset = match place {
             DataPlace::Rooms(rooms) => Dataset::from_rooms(*rooms),
-            DataPlace::Path(path) if path.is_dir() => return Self::open_folder(path, set),
+            DataPlace::Path(path) if path.is_dir() => {
+                return Self::open_folder(path, set).map_err(|e| with_import_hint(Some(path), e));
+            }
             DataPlace::Path(path) if is_image(path) => Dataset::from_images(path, &[])?,
             DataPlace::Path(_) | DataPlace::Files(_) | DataPlace::Known { .. } => {
                 let set = Dataset::open(place, None, set)?;

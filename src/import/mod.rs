@@ -2,7 +2,7 @@
 //!
 //! An [`Adapter`] lists the frames of one kind of data set and reads their maps one frame at a time. All adapters use the same units:
 //! depth in millimetres, class numbers of a label space, segment numbers from 1. `src/docs/importing.md` shows the layouts.
-//! Recordings of robots have no maps and no adapter: [`recording`] reads them.
+//! Recordings of robots have no maps and no adapter: [`recording`] and [`lerobot`] read them.
 
 mod adapter;
 mod combined;
@@ -13,6 +13,7 @@ mod habitat;
 mod hm3d;
 mod hypersim;
 pub(crate) mod keyframes;
+pub(crate) mod lerobot;
 mod map_files;
 mod mp3d;
 mod nyu;

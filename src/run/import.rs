@@ -2,6 +2,8 @@
 
 mod camera_facts;
 mod frame_writer;
+mod lerobot;
+mod lerobot_frames;
 mod mcap_files;
 mod recording;
 mod topic_list;
@@ -74,6 +76,9 @@ enum ImportForm {
         #[arg(value_name = "FILE", add = Decides::Nothing)]
         file: PathBuf,
     },
+    /// Take frames of the episodes of a LeRobot data set; without --out, list its cameras
+    #[command(name = "lerobot")]
+    LeRobot(Box<lerobot::LeRobotArgs>),
     /// Take frames of a video, decoded by ffmpeg; without --out, describe it
     Video(Box<video::VideoArgs>),
 }
@@ -122,6 +127,7 @@ pub(crate) fn import(command: &ImportCommand, progress: &Progress) -> Result<Out
         (Some(ImportForm::Script { kind }), _) => print_script(*kind),
         (Some(ImportForm::Mcap(args)), _) => recording::import(args, progress),
         (Some(ImportForm::Rosbag { file }), _) => Err(rosbag_error(file)?),
+        (Some(ImportForm::LeRobot(args)), _) => lerobot::import(args, progress),
         (Some(ImportForm::Video(args)), _) => video::import(args, progress),
         (None, Some(args)) => import_frames(args, progress),
         (None, None) => Err(Error::usage("KIND", "a kind of data set is missing")),

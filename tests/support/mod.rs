@@ -17,6 +17,7 @@ pub mod frames;
 pub mod house;
 pub mod icc_files;
 pub mod image_files;
+pub mod lerobot;
 pub mod made;
 pub mod onnx;
 pub mod parquet_file;

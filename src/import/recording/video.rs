@@ -15,6 +15,10 @@ use crate::picture::decode_rule::MAX_PIXELS;
 use crate::types::Rgb;
 use crate::types::text::excerpt;
 
+/// Maximum length of an expression that selects frames, in bytes: a command line of Windows has at most 32,767 characters. Without the
+/// expression, all frames are decoded.
+const MAX_SELECT: usize = 30_000;
+
 /// Maximum number of lines of ffmpeg in an error message.
 const MAX_LOG_LINES: usize = 2;
 
@@ -22,6 +26,8 @@ const MAX_LOG_LINES: usize = 2;
 #[derive(Debug)]
 pub(crate) struct Video {
     path: PathBuf,
+    /// Container format that ffmpeg has to assume; `None` to find it out.
+    format: Option<&'static str>,
     /// Duration in seconds; `None` if unknown.
     pub(crate) duration: Option<f64>,
     /// Codec, size and rate of the first video stream.
@@ -62,6 +68,10 @@ struct Conversion {
 #[derive(Debug)]
 pub(crate) struct VideoFrames {
     path: PathBuf,
+    /// Codec of the video, as ffmpeg calls it.
+    codec: String,
+    /// Number of frames so far.
+    count: usize,
     child: Child,
     output: BufReader<ChildStdout>,
     facts: Receiver<FrameFacts>,
@@ -72,6 +82,8 @@ pub(crate) struct VideoFrames {
     colours: Option<FrameColours>,
     /// The first frame, which was read to learn the colours.
     first: Option<Result<Option<VideoFrame>>>,
+    /// The log after ffmpeg has ended.
+    ended_log: FfmpegLog,
 }
 
 /// Log of ffmpeg.
@@ -83,7 +95,16 @@ struct FfmpegLog {
     first_damage: Option<String>,
     /// Number of lines about damage.
     damage_lines: usize,
+    /// True if ffmpeg has no decoder for the video.
+    lacks_decoder: bool,
 }
+
+/// Words in ffmpeg's lines about a codec that it cannot decode, in lower case. Its own decoder of AV1 needs a graphics card.
+const NO_DECODER_WORDS: [&str; 3] = [
+    "no decoder found",
+    "hardware accelerated av1 decoding",
+    "decoder (codec",
+];
 
 /// Words in ffmpeg's lines about damage, in lower case.
 const DAMAGE_WORDS: [&str; 4] = ["error", "invalid", "corrupt", "truncating"];
@@ -91,6 +112,7 @@ const DAMAGE_WORDS: [&str; 4] = ["error", "invalid", "corrupt", "truncating"];
 impl FfmpegLog {
     fn add(&mut self, line: &str) {
         let words = line.to_lowercase();
+        self.lacks_decoder |= NO_DECODER_WORDS.iter().any(|word| words.contains(word));
         // Names of files and their indented metadata may contain these words.
         let is_about_file = line.starts_with([' ', '\t'])
             || ["Input #", "Output #"]
@@ -113,8 +135,20 @@ impl Video {
     /// # Errors
     /// If ffmpeg is not on PATH, or finds no video in the file.
     pub(crate) fn open(path: &Path) -> Result<Self> {
+        Self::open_as(path, None)
+    }
+
+    /// Reads the metadata of an MP4 file of a data set. A playlist in its place, which could name files elsewhere, is not read.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub(crate) fn open_mp4(path: &Path) -> Result<Self> {
+        Self::open_as(path, Some("mov"))
+    }
+
+    fn open_as(path: &Path, format: Option<&'static str>) -> Result<Self> {
         crate::files::reading::refuse_pipes(path).map_err(|e| Error::file(path, "read", e))?;
-        let output = ffmpeg(path)
+        let output = ffmpeg(path, format)
             .stdin(Stdio::null())
             .output()
             .map_err(|e| start_error(&e))?;
@@ -129,6 +163,7 @@ impl Video {
             .and_then(|(_, rest)| parse_duration(rest.split(',').next()?));
         Ok(Self {
             path: path.to_owned(),
+            format,
             duration,
             stream: stream.lines().next().unwrap_or_default().trim().to_owned(),
             passthrough: if supports_fps_mode(&log) {
@@ -148,12 +183,36 @@ impl Video {
     /// # Errors
     /// If ffmpeg cannot be started, or the colours of the video are not converted.
     pub(crate) fn frames(&self, interval: f64) -> Result<VideoFrames> {
+        if interval == 0.0 {
+            return self.converted(None);
+        }
+        // The small addend is for frames at a multiple of the interval, whose quotient may be rounded down.
+        let [this, last] =
+            ["t", "prev_selected_t"].map(|time| format!("floor(({time}-start_t)/{interval}+1e-7)"));
+        self.converted(Some(&format!("isnan(prev_selected_t)+gt({this},{last})")))
+    }
+
+    /// Decodes at least the frames in these spans of time, each from its first second to its last, and converts them like [`Self::frames`].
+    ///
+    /// # Errors
+    /// As [`Self::frames`].
+    pub(crate) fn frames_within(&self, spans: &[[f64; 2]]) -> Result<VideoFrames> {
+        let spans: Vec<String> = spans
+            .iter()
+            .map(|[from, to]| format!("between(t,{from:.6},{to:.6})"))
+            .collect();
+        let select = spans.join("+");
+        self.converted(Some(&*select).filter(|select| select.len() <= MAX_SELECT))
+    }
+
+    /// Decodes the frames that an expression of ffmpeg's filter `select` selects, or all, and converts them to sRGB.
+    fn converted(&self, select: Option<&str>) -> Result<VideoFrames> {
         let error = |problem: String| Error::data(self.path.display(), problem);
         if self.is_dolby_vision {
             let problem = "the pictures are only for displays with Dolby Vision; export the video for other displays (HDR10, HLG or SDR) first";
             return Err(error(problem.to_owned()));
         }
-        let mut frames = self.decode(interval, None)?;
+        let mut frames = self.decode(select, None)?;
         let first = frames.next();
         let conversion = match &frames.colours {
             Some(colours) => colours.conversion(&self.path).map_err(error)?,
@@ -166,7 +225,7 @@ impl Video {
         match conversion {
             Some(conversion) => {
                 drop(frames);
-                self.decode(interval, Some(conversion))
+                self.decode(select, Some(conversion))
             }
             None => {
                 frames.first = Some(first);
@@ -176,16 +235,16 @@ impl Video {
     }
 
     /// Starts ffmpeg. Frames that are converted are decoded to 16 bits.
-    fn decode(&self, interval: f64, conversion: Option<FrameConversion>) -> Result<VideoFrames> {
-        let filter = if interval > 0.0 {
-            // The small addend is for frames at a multiple of the interval, whose quotient may be rounded down.
-            let [this, last] = ["t", "prev_selected_t"]
-                .map(|time| format!("floor(({time}-start_t)/{interval}+1e-7)"));
-            format!("select='isnan(prev_selected_t)+gt({this},{last})',showinfo")
-        } else {
-            "showinfo".to_owned()
+    fn decode(
+        &self,
+        select: Option<&str>,
+        conversion: Option<FrameConversion>,
+    ) -> Result<VideoFrames> {
+        let filter = match select {
+            Some(select) => format!("select='{select}',showinfo"),
+            None => "showinfo".to_owned(),
         };
-        let mut command = ffmpeg(&self.path);
+        let mut command = ffmpeg(&self.path, self.format);
         command
             .args(["-map", "0:v:0", "-vf", &filter])
             .args(self.passthrough)
@@ -207,8 +266,11 @@ impl Video {
         };
         let (sender, facts) = channel();
         let log = thread::spawn(move || read_log(log, &sender));
+        let codec = self.stream.split([' ', ',']).next().unwrap_or_default();
         Ok(VideoFrames {
             path: self.path.clone(),
+            codec: codec.to_owned(),
+            count: 0,
             child,
             output: BufReader::with_capacity(1 << 20, output),
             facts,
@@ -216,6 +278,7 @@ impl Video {
             conversion: conversion.map(Conversion::new),
             colours: None,
             first: None,
+            ended_log: FfmpegLog::default(),
         })
     }
 }
@@ -272,18 +335,14 @@ fn read_log(log: ChildStderr, facts: &Sender<FrameFacts>) -> FfmpegLog {
 }
 
 /// ffmpeg with a file as input. It may only open files, so a playlist in an untrusted file cannot lead to a server.
-fn ffmpeg(path: &Path) -> Command {
+fn ffmpeg(path: &Path, format: Option<&str>) -> Command {
     let mut input = OsString::from("file:");
     input.push(path);
     let mut command = Command::new("ffmpeg");
     command
-        .args([
-            "-nostdin",
-            "-nostats",
-            "-protocol_whitelist",
-            "file,pipe",
-            "-i",
-        ])
+        .args(["-nostdin", "-nostats", "-protocol_whitelist", "file,pipe"])
+        .args(format.iter().flat_map(|format| ["-f", format]))
+        .arg("-i")
         .arg(input);
     command
 }
@@ -361,11 +420,16 @@ impl VideoFrames {
                     .map_err(|_| self.failure("it states no time of a frame"))?;
                 self.check_colours(&facts)?;
                 self.colours = facts.colours;
+                self.count += 1;
                 let time = facts.time;
                 Ok(Some(VideoFrame { time, image }))
             }
             Ok(None) => {
                 let status = self.child.wait();
+                // Without a decoder, some versions end without an error.
+                if self.count == 0 && self.ended_log().lacks_decoder {
+                    return Err(self.no_decoder());
+                }
                 if status.is_ok_and(|status| status.success()) {
                     return Ok(None);
                 }
@@ -481,13 +545,13 @@ impl VideoFrames {
 
     /// Message about damage that ffmpeg reported while it decoded the video to the end; `None` if it reported none.
     pub(crate) fn damage(mut self) -> Option<String> {
-        let log = self.log.take()?.join().ok()?;
-        let first = log.first_damage?;
+        let log = self.ended_log();
+        let first = log.first_damage.as_ref()?;
         let count = match log.damage_lines {
             1 => "a problem".to_owned(),
             count => format!("{count} problems, first"),
         };
-        Some(format!("ffmpeg reports {count}: {}", excerpt(&first, 150)))
+        Some(format!("ffmpeg reports {count}: {}", excerpt(first, 150)))
     }
 
     /// Stops ffmpeg, and returns the error with its last lines.
@@ -495,13 +559,27 @@ impl VideoFrames {
         // These fail only if ffmpeg has already ended.
         drop(self.child.kill());
         drop(self.child.wait());
-        let log = self
-            .log
-            .take()
-            .and_then(|log| log.join().ok())
-            .unwrap_or_default();
+        let log = self.ended_log();
         let problem = format!("ffmpeg: {problem}; {}", last_lines(&log.last));
         Error::data(self.path.display(), problem)
+    }
+
+    /// The log of ffmpeg, which has ended.
+    fn ended_log(&mut self) -> &FfmpegLog {
+        if let Some(log) = self.log.take() {
+            self.ended_log = log.join().unwrap_or_default();
+        }
+        &self.ended_log
+    }
+
+    /// The error if the installed ffmpeg has no decoder for the codec.
+    fn no_decoder(&self) -> Error {
+        let problem = format_args!(
+            "the installed one has no decoder for {}, the codec of {}; install one that has (for av1 with libdav1d): apt install ffmpeg (Debian 11, Ubuntu 22.04 or later), brew install ffmpeg, or conda install -c conda-forge ffmpeg",
+            self.codec,
+            self.path.display()
+        );
+        Error::usage("ffmpeg", problem)
     }
 }
 

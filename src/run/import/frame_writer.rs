@@ -40,6 +40,8 @@ pub(super) struct ChosenFrame {
     pub(super) name: String,
     pub(super) place: Place,
     pub(super) log_time: Nanoseconds,
+    /// Further facts for its line in `frames.jsonl`.
+    pub(super) facts: Map<String, Value>,
     pub(super) source: FrameSource,
 }
 
@@ -50,13 +52,15 @@ pub(super) enum FrameSource {
         channel: Arc<Channel>,
         bytes: Vec<u8>,
     },
+    /// An image file.
+    File(Vec<u8>),
     Image(Rgb),
 }
 
 impl ChosenFrame {
     fn bytes(&self) -> usize {
         match &self.source {
-            FrameSource::Message { bytes, .. } => bytes.len(),
+            FrameSource::Message { bytes, .. } | FrameSource::File(bytes) => bytes.len(),
             FrameSource::Image(image) => image.samples().len(),
         }
     }
@@ -189,6 +193,7 @@ impl<'a> FrameWriter<'a> {
             FrameSource::Message { channel, bytes } => {
                 self.encode_message(frame, channel, bytes)?
             }
+            FrameSource::File(bytes) => self.encode_file(frame, bytes.clone(), "unknown")?,
             FrameSource::Image(image) => EncodedFrame {
                 bytes: crate::picture::png(image).map_err(|e| e.to_string())?,
                 ending: "png",
@@ -215,6 +220,7 @@ impl<'a> FrameWriter<'a> {
         if !encoded.frame_id.is_empty() {
             line.insert("frame_id".to_owned(), json!(encoded.frame_id));
         }
+        line.extend(frame.facts.clone());
         Ok(WrittenFrame {
             topic: frame.topic.clone(),
             time: frame.place.time,
@@ -247,62 +253,72 @@ impl<'a> FrameWriter<'a> {
                     frame_id: message.frame_id,
                 })
             }
-            MessageImage::File { format, bytes } => {
-                let file = ImageFile::new(bytes.into_owned(), frame.words(), DecodeRule::default());
-                let ending = file.extension();
-                if !COPIED.contains(&ending) {
-                    return Err(format!(
-                        "format {:?}; a JPEG, PNG or WebP file expected",
-                        excerpt(&format, 60)
-                    ));
-                }
-                let note = file.note();
-                let is_turned = note.orientation.is_some();
-                let frame_id = message.frame_id;
-                let has_white = match note.depth {
-                    None => false,
-                    Some(DepthNote::Rgb16Image) => note.colour.is_some(),
-                    Some(DepthNote::Light) => true,
-                };
-                if self.white != u16::MAX && has_white {
-                    let problem = "the file states what its codes mean, so --white does not apply; leave it out, or take the topic alone";
-                    return Err(problem.to_owned());
-                }
-                if note.depth == Some(DepthNote::Rgb16Image) {
-                    let image = deep_image(&file)?;
-                    self.tally.add(&FrameId(frame.words()), &note);
-                    let size = (image.width(), image.height());
-                    let pixels = RawPixels::Rgb16Image(image);
-                    let peak_16 = pixels.peak_16();
-                    let bytes = if self.white == u16::MAX {
-                        file.bytes().to_vec()
-                    } else {
-                        pixels
-                            .with_white(self.white)
-                            .png()
-                            .map_err(|e| e.to_string())?
-                    };
-                    return Ok(EncodedFrame {
-                        bytes,
-                        ending: "png",
-                        size,
-                        is_turned,
-                        peak_16,
-                        frame_id,
-                    });
-                }
-                let (width, height) = file.check().map_err(problem)?;
-                self.tally.add(&FrameId(frame.words()), &note);
-                Ok(EncodedFrame {
-                    size: (width as usize, height as usize),
-                    is_turned,
-                    peak_16: None,
-                    ending,
-                    bytes: file.bytes().to_vec(),
-                    frame_id,
-                })
-            }
+            MessageImage::File { format, bytes } => Ok(EncodedFrame {
+                frame_id: message.frame_id,
+                ..self.encode_file(frame, bytes.into_owned(), &format)?
+            }),
         }
+    }
+
+    /// Checks an image file that is copied unchanged. `format` is its stated format.
+    fn encode_file(
+        &self,
+        frame: &ChosenFrame,
+        bytes: Vec<u8>,
+        format: &str,
+    ) -> Result<EncodedFrame, String> {
+        let file = ImageFile::new(bytes, frame.words(), DecodeRule::default());
+        let ending = file.extension();
+        if !COPIED.contains(&ending) {
+            return Err(format!(
+                "format {:?}; a JPEG, PNG or WebP file expected",
+                excerpt(format, 60)
+            ));
+        }
+        let note = file.note();
+        let is_turned = note.orientation.is_some();
+        let has_white = match note.depth {
+            None => false,
+            Some(DepthNote::Rgb16Image) => note.colour.is_some(),
+            Some(DepthNote::Light) => true,
+        };
+        if self.white != u16::MAX && has_white {
+            let problem = "the file states what its codes mean, so --white does not apply; leave it out, or take the topic alone";
+            return Err(problem.to_owned());
+        }
+        if note.depth == Some(DepthNote::Rgb16Image) {
+            let image = deep_image(&file)?;
+            self.tally.add(&FrameId(frame.words()), &note);
+            let size = (image.width(), image.height());
+            let pixels = RawPixels::Rgb16Image(image);
+            let peak_16 = pixels.peak_16();
+            let bytes = if self.white == u16::MAX {
+                file.bytes().to_vec()
+            } else {
+                pixels
+                    .with_white(self.white)
+                    .png()
+                    .map_err(|e| e.to_string())?
+            };
+            return Ok(EncodedFrame {
+                bytes,
+                ending: "png",
+                size,
+                is_turned,
+                peak_16,
+                frame_id: String::new(),
+            });
+        }
+        let (width, height) = file.check().map_err(problem)?;
+        self.tally.add(&FrameId(frame.words()), &note);
+        Ok(EncodedFrame {
+            size: (width as usize, height as usize),
+            is_turned,
+            peak_16: None,
+            ending,
+            bytes: file.bytes().to_vec(),
+            frame_id: String::new(),
+        })
     }
 
     /// Writes the waiting frames and the files about all frames, with `info` as `dataset.json`. Returns the number of scenes.
@@ -409,12 +425,12 @@ fn parse<'a>(channel: &Channel, bytes: &'a [u8]) -> Result<ImageMessage<'a>, Str
     }
 }
 
-/// The line about the written frames and scenes. `stretch` is the duration of a scene in seconds, `seen` the number of frames read.
+/// The line about the written frames and scenes. `extent` is that of a scene, such as `30 s`, `seen` the number of frames read.
 pub(super) fn summary(
     out: &Path,
     frames: usize,
     scenes: usize,
-    stretch: f64,
+    extent: &str,
     seen: usize,
     failed: usize,
 ) -> String {
@@ -429,7 +445,7 @@ pub(super) fn summary(
         format!(", chosen from {seen}")
     };
     format!(
-        "{}: {} of {} ({stretch} s each){chosen}{failed}\n",
+        "{}: {} of {} ({extent} each){chosen}{failed}\n",
         out.display(),
         counted(frames, "frame"),
         counted(scenes, "scene"),

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use clap::Args;
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use super::camera_facts::{Cameras, Exposures};
 use super::frame_writer::{ChosenFrame, FrameSource, FrameWriter, summary, thumbnail};
@@ -72,21 +72,9 @@ pub(super) struct WrittenArgs {
 }
 
 impl WrittenArgs {
-    /// Refuses a file, and a folder that has frames already unless `--force` is set.
+    /// As [`check_output`].
     pub(super) fn check(&self, out: &Path) -> Result<()> {
-        if out.is_file() {
-            return Err(Error::data(
-                out.display(),
-                "a file; a folder for frames expected",
-            ));
-        }
-        let list = out.join("frames.jsonl");
-        if self.force || !list.exists() {
-            return Ok(());
-        }
-        let problem =
-            "the folder has frames already; --force overwrites them, another --out keeps both";
-        Err(Error::data(list.display(), problem))
+        check_output(out, self.force)
     }
 
     /// The content of `dataset.json` for the frames of a drive.
@@ -98,6 +86,23 @@ impl WrittenArgs {
             "stretch": self.stretch,
         })
     }
+}
+
+/// Refuses a file, and a folder that has frames already unless `--force` is set.
+pub(super) fn check_output(out: &Path, force: bool) -> Result<()> {
+    if out.is_file() {
+        return Err(Error::data(
+            out.display(),
+            "a file; a folder for frames expected",
+        ));
+    }
+    let list = out.join("frames.jsonl");
+    if force || !list.exists() {
+        return Ok(());
+    }
+    let problem =
+        "the folder has frames already; --force overwrites them, another --out keeps both";
+    Err(Error::data(list.display(), problem))
 }
 
 /// Warns of times in `--at` for which a topic or video has no frame.
@@ -174,7 +179,7 @@ fn selected_topics(
 }
 
 /// A topic as part of a file name.
-fn slug(topic: &str) -> String {
+pub(super) fn slug(topic: &str) -> String {
     let name: String = topic
         .chars()
         .map(|c| {
@@ -449,6 +454,7 @@ impl<'a> Import<'a> {
             name,
             place,
             log_time: message.log_time,
+            facts: Map::new(),
             source: FrameSource::Message {
                 channel: Arc::clone(&message.channel),
                 bytes,
@@ -538,7 +544,14 @@ impl<'a> Import<'a> {
         }
         let seen = self.topics.values().map(|selected| selected.seen).sum();
         let frames = self.writer.written.len();
-        let mut output = summary(out, frames, scenes, args.written.stretch, seen, failed);
+        let mut output = summary(
+            out,
+            frames,
+            scenes,
+            &format!("{} s", args.written.stretch),
+            seen,
+            failed,
+        );
         let _ = writeln!(
             output,
             "topics: {}; {}",

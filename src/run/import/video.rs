@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use clap::Args;
-use serde_json::json;
+use serde_json::{Map, json};
 
 use super::frame_writer::{ChosenFrame, FrameSource, FrameWriter, summary};
 use super::recording::{WrittenArgs, drive_name, warn_of_missed};
@@ -68,6 +68,7 @@ pub(crate) fn import(args: &VideoArgs, progress: &Progress) -> Result<Outcome> {
         let frame = match frames.next() {
             Ok(Some(frame)) => frame,
             Ok(None) => break,
+            Err(e @ Error::Usage { .. }) => return Err(e),
             Err(e) => {
                 problem = Some(e);
                 break;
@@ -87,6 +88,7 @@ pub(crate) fn import(args: &VideoArgs, progress: &Progress) -> Result<Outcome> {
                 name,
                 place,
                 log_time: frame.time,
+                facts: Map::new(),
                 source: FrameSource::Image(frame.image),
             };
             writer.push(frame, true);
@@ -116,7 +118,7 @@ pub(crate) fn import(args: &VideoArgs, progress: &Progress) -> Result<Outcome> {
         out,
         writer.written.len(),
         scenes,
-        args.written.stretch,
+        &format!("{} s", args.written.stretch),
         seen,
         failed,
     );

@@ -3,6 +3,7 @@
 mod hm3d;
 mod import;
 mod inputs;
+mod lerobot;
 mod photographs;
 mod questions;
 mod ready_made;

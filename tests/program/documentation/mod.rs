@@ -2,7 +2,7 @@
 //!
 //! A block with the fence `sh` is run, one with `sh no-run` is only parsed: it needs large data, another machine or an installer.
 //! All blocks of a page are run by one shell in an empty folder, with a mock endpoint, which has batches, at `OPENAI_BASE_URL`, few and small rooms
-//! where no data are named, the folder `models` at `$MODELS`, and a recording of a robot at `$DRIVE`. A comment `<!-- test: … -->` is a
+//! where no data are named, the folder `models` at `$MODELS`, a recording of a robot at `$DRIVE`, and a LeRobot data set at `$LEROBOT`. A comment `<!-- test: … -->` is a
 //! command that readers do not see. A block with the fence `text` shows what commands of its page print, `text first-command` what the
 //! first command of the README prints, with its numbers; `text no-run` shows what others print.
 
@@ -18,6 +18,7 @@ use std::process::{Command, Output, Stdio};
 
 use crate::support::batches::{Course, MockBatches};
 use crate::support::endpoint::Answer;
+use crate::support::lerobot::Set;
 use crate::support::recording::{Compression, drive};
 use crate::support::rooms::rooms;
 use crate::support::run::{Bench, PROGRAM};
@@ -26,8 +27,11 @@ use darkqa_eval::cli;
 use page::{Block, BlockKind, Page, files, pages, root};
 use regex::Regex;
 
-/// Flags of other programs that pages name: `sbatch`, `pip`, `cargo`, `inspect eval`, and servers of models.
-const OF_OTHERS: [&str; 22] = [
+/// Flags of other programs that pages name: `sbatch`, `hf`, `pip`, `cargo`, `inspect eval`, and servers of models.
+const OF_OTHERS: [&str; 25] = [
+    "--repo-type",
+    "--local-dir",
+    "--revision",
     "--dst",
     "--dst-storage",
     "--array",
@@ -127,10 +131,19 @@ const PRINTED: &str = "printed.txt";
 /// The file with a recording of a robot.
 const DRIVE: &str = "recording.mcap";
 
+const LEROBOT: &str = "lerobot-set";
+
 /// Runs the commands of a page in a folder.
 fn run(page: &Page, folder: &Path) -> Output {
     if page.text.contains("$DRIVE") {
         std::fs::write(folder.join(DRIVE), drive(12, Compression::Zstd)).unwrap();
+    }
+    if page.text.contains("$LEROBOT") {
+        let set = Set {
+            lengths: vec![4; 10],
+            ..Set::default()
+        };
+        set.write(&folder.join(LEROBOT));
     }
     let mock = MockBatches::start([Course::of("in_progress completed").text("A")]);
     mock.chat(|body| {
@@ -156,6 +169,7 @@ fn run(page: &Page, folder: &Path) -> Output {
         .env("DARKQA_DATA", rooms(2, "96x64"))
         .env("MODELS", root().join("models"))
         .env("DRIVE", folder.join(DRIVE))
+        .env("LEROBOT", folder.join(LEROBOT))
         .stdin(Stdio::null())
         .output()
         .unwrap()

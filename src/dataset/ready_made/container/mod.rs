@@ -9,6 +9,7 @@ mod find;
 mod json;
 mod json_scan;
 mod parquet;
+mod parquet_columns;
 mod shards;
 mod splits;
 mod table;
@@ -27,6 +28,8 @@ use crate::files::reading;
 pub(in crate::dataset) use archive::Archive;
 pub(in crate::dataset) use find::is_set_folder;
 pub(super) use find::{FoundFiles, Joined, find_files};
+pub(crate) use parquet_columns::ParquetColumns;
+pub(crate) use tree::cached_snapshot;
 
 /// Supported file types, for messages.
 const SUPPORTED: &str =
@@ -187,7 +190,7 @@ fn extension(path: &Path) -> String {
 }
 
 /// Refuses a Git LFS pointer, the placeholder of a file that was not downloaded.
-fn refuse_lfs_pointer(path: &Path) -> Result<()> {
+pub(crate) fn refuse_lfs_pointer(path: &Path) -> Result<()> {
     const POINTER: &[u8] = b"version https://git-lfs.github.com/spec";
     let mut file = reading::open(path).map_err(|e| Error::file(path, "read", e))?;
     let mut head = [0; POINTER.len()];

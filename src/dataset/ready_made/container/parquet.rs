@@ -27,7 +27,7 @@ use crate::files::reading;
 /// Rows that are decoded together; the images of all of them are in memory at once.
 const BATCH_ROWS: usize = 8;
 
-fn open(path: &Path) -> Result<File> {
+pub(super) fn open(path: &Path) -> Result<File> {
     reading::open(path).map_err(|e| Error::file(path, "read", e))
 }
 
@@ -36,7 +36,7 @@ fn open(path: &Path) -> Result<File> {
 pub(super) struct Footer(OnceLock<Arc<ParquetMetaData>>);
 
 impl Footer {
-    fn metadata(&self, path: &Path) -> Result<Arc<ParquetMetaData>> {
+    pub(super) fn metadata(&self, path: &Path) -> Result<Arc<ParquetMetaData>> {
         if let Some(known) = self.0.get() {
             return Ok(Arc::clone(known));
         }
@@ -54,7 +54,7 @@ impl Footer {
 }
 
 /// Error for a file that the Parquet library cannot read.
-fn corrupt_file(path: &Path, problem: &str) -> Error {
+pub(super) fn corrupt_file(path: &Path, problem: &str) -> Error {
     let problem = problem.trim_start_matches("Parquet error: ");
     Error::data(
         path.display(),
@@ -150,7 +150,7 @@ fn byte_length(field: &Field) -> usize {
 }
 
 /// Rejects a file with a compression codec that is not supported.
-fn check_codecs(path: &Path, footer: &ParquetMetaData) -> Result<()> {
+pub(super) fn check_codecs(path: &Path, footer: &ParquetMetaData) -> Result<()> {
     let columns = footer
         .row_groups()
         .iter()

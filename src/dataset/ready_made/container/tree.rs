@@ -26,30 +26,8 @@ impl Tree {
     /// # Errors
     /// If the cache does not name a snapshot.
     pub(super) fn from_folder(place: &Path) -> Result<Self> {
-        let canonical = place.canonicalize().unwrap_or_else(|_| place.to_owned());
-        if !(is_cached_repository(&canonical) && place.join("snapshots").is_dir()) {
-            let repository = canonical
-                .ancestors()
-                .nth(2)
-                .filter(|path| is_cached_repository(path));
-            return Ok(Self::Folder {
-                folder: place.to_owned(),
-                blobs: repository.and_then(own_blobs),
-            });
-        }
-        let head = reading::text(&place.join("refs/main"))?;
-        let snapshot = place.join("snapshots").join(head.trim());
-        let is_own = snapshot
-            .canonicalize()
-            .is_ok_and(|real| real.starts_with(&canonical));
-        if !snapshot.is_dir() || !is_own || head.trim().contains(['/', '\\']) {
-            let problem = "refs/main names no folder in snapshots; download the repository again";
-            return Err(Error::data(place.display(), problem));
-        }
-        Ok(Self::Folder {
-            folder: snapshot,
-            blobs: own_blobs(&canonical),
-        })
+        let (folder, blobs) = cached_snapshot(place)?;
+        Ok(Self::Folder { folder, blobs })
     }
 
     /// Path of the folder or the ZIP file.
@@ -110,6 +88,32 @@ impl Tree {
     pub(super) fn full_path(&self, path: &Path) -> PathBuf {
         self.place().join(path)
     }
+}
+
+/// The folder itself, or the newest snapshot if the folder is a repository in a hub's cache; and the folder of the cache with the files
+/// that the links in a snapshot lead to, if it lies in the repository.
+///
+/// # Errors
+/// If the cache does not name a snapshot.
+pub(crate) fn cached_snapshot(place: &Path) -> Result<(PathBuf, Option<PathBuf>)> {
+    let canonical = place.canonicalize().unwrap_or_else(|_| place.to_owned());
+    if !(is_cached_repository(&canonical) && place.join("snapshots").is_dir()) {
+        let repository = canonical
+            .ancestors()
+            .nth(2)
+            .filter(|path| is_cached_repository(path));
+        return Ok((place.to_owned(), repository.and_then(own_blobs)));
+    }
+    let head = reading::text(&place.join("refs/main"))?;
+    let snapshot = place.join("snapshots").join(head.trim());
+    let is_own = snapshot
+        .canonicalize()
+        .is_ok_and(|real| real.starts_with(&canonical));
+    if !snapshot.is_dir() || !is_own || head.trim().contains(['/', '\\']) {
+        let problem = "refs/main names no folder in snapshots; download the repository again";
+        return Err(Error::data(place.display(), problem));
+    }
+    Ok((snapshot, own_blobs(&canonical)))
 }
 
 /// Folder `blobs` of a repository in a hub's cache; `None` if there is none, or if it is a link out of the repository.

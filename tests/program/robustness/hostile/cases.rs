@@ -349,6 +349,17 @@ pub(crate) const CASES: &[Case] = &[
         &["drive.mcap"],
         &[],
     ),
+    Case::new("import lerobot robot3", &["robot3/meta"], &["robot3/data"]),
+    Case::new(
+        "import lerobot robot3 --camera observation.images.front --every 0 --out out",
+        &["robot3"],
+        &[],
+    ),
+    Case::new(
+        "import lerobot robot2 --camera observation.images.wrist --max-frames 2 --out out",
+        &["robot2"],
+        &[],
+    ),
     Case::new(
         "import script habitat --config plain.toml",
         &["plain.toml"],

@@ -14,6 +14,7 @@ use serde_json::{Value, json};
 
 use crate::robustness::hostile::process::{Finished, Running, program};
 use crate::support::endpoint::{Answer, MockEndpoint};
+use crate::support::lerobot::Set;
 use crate::support::onnx;
 use crate::support::run::{Bench, files, records, words};
 use crate::support::snapshot::redacted;
@@ -153,6 +154,34 @@ fn oversized_sets_are_refused() {
     let line = "--model random --data small.parquet --levels L0 --out small";
     let finished = call(&bench, line);
     assert_eq!(finished.code, Some(0), "{}", stderr(&finished));
+}
+
+#[test]
+fn many_rows_of_lerobot_are_refused() {
+    for (rows, problem) in [
+        (
+            5_000_001,
+            "5000001 rows; at most 5000000 in a file are read",
+        ),
+        (
+            4_900_000,
+            "4900000 frames of observation.images.front left out",
+        ),
+    ] {
+        let bench = Bench::new();
+        let set = Set {
+            version: "v2.1",
+            lengths: vec![rows],
+            videos: true,
+            ..Set::default()
+        };
+        set.write_tables(&bench.path("set"));
+        let line = "import lerobot set --camera observation.images.front --every 0 --out out";
+        let finished = call(&bench, line);
+        let text = stderr(&finished);
+        assert_eq!(finished.code, Some(2), "{text}");
+        assert!(text.contains(problem), "{text}");
+    }
 }
 
 #[test]

@@ -5,7 +5,7 @@
 //! The short form runs with the other tests. The long form is
 //! `HOSTILE_RUNS=100000 HOSTILE_SEED=7 cargo test --test program hostile:: -- --ignored --nocapture`; it writes each failure as a
 //! folder into `target/tmp/hostile`, named by its seed and number. `HOSTILE_FIRST` is the number of its first run (default: 0),
-//! so that one run is done again by its number.
+//! so that one run is done again by its number. `HOSTILE_CALLS` are words of the calls to try, such as `import lerobot` (default: all).
 
 #![cfg(unix)]
 
@@ -32,7 +32,7 @@ const SHORT: usize = 450;
 
 #[test]
 fn damaged_files_are_read_or_refused() {
-    let summary = campaign::run(20, 0..SHORT);
+    let summary = campaign::run(20, 0..SHORT, "");
     assert!(summary.faults.is_empty(), "{summary}");
     let count = |code: i32| summary.codes.get(&code).copied().unwrap_or_default();
     assert!(count(0) > SHORT / 10 && count(2) > SHORT / 10, "{summary}");
@@ -51,7 +51,8 @@ fn damaged_inputs_are_read_or_refused() {
     let runs = number("HOSTILE_RUNS", 100_000);
     let first = number("HOSTILE_FIRST", 0);
     println!("seed {seed}, {runs} runs from number {first}");
-    let summary = campaign::run(seed, first as usize..(first + runs) as usize);
+    let calls = std::env::var("HOSTILE_CALLS").unwrap_or_default();
+    let summary = campaign::run(seed, first as usize..(first + runs) as usize, &calls);
     println!("{summary}");
     for (count, example) in summary.unnamed.values() {
         println!("{count} errors without the file, as\n{example}");

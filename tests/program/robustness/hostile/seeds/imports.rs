@@ -3,6 +3,7 @@
 use image::{GrayImage, ImageBuffer, ImageFormat, Luma, Rgb, RgbImage};
 
 use crate::support::image_files::{jpeg, png};
+use crate::support::lerobot::Set;
 use crate::support::recording::{Compression, drive};
 use crate::support::run::Bench;
 
@@ -11,6 +12,13 @@ const HEIGHT: u32 = 6;
 
 pub(super) fn make(bench: &Bench) {
     bench.file("drive.mcap", drive(2, Compression::Zstd));
+    for (folder, version) in [("robot3", "v3.0"), ("robot2", "v2.1")] {
+        let set = Set {
+            version,
+            ..Set::default()
+        };
+        set.write(&bench.path(folder));
+    }
     habitat(bench);
     scannet(bench);
     let at = |name: &str| format!("nyu/{name}/00001.png");
