@@ -232,7 +232,7 @@ impl AskError {
                     || mentions(&vocabulary::NO_RIGHT)
                     || mentions(&vocabulary::MODEL)) =>
             {
-                Self::permanent(CHECK_RIGHT)
+                Self::permanent_if(!says_nothing, CHECK_RIGHT)
             }
             404 | 410
                 if api_error.page.is_some()
@@ -240,7 +240,10 @@ impl AskError {
                     || mentions(&vocabulary::PATH)
                     || api_error.names(&sent.parameters.model) =>
             {
-                Self::permanent("check --base-url (many end with /v1) and --model")
+                Self::permanent_if(
+                    !says_nothing,
+                    "check --base-url (many end with /v1) and --model",
+                )
             }
             // The words say something else, which may concern this request alone.
             403 | 404 | 410 => Self::of_status(""),
@@ -300,6 +303,15 @@ impl AskError {
         Self {
             reach: Reach::Endpoint,
             ..Self::new(FailureKind::Request, hint.to_owned())
+        }
+    }
+
+    /// Error that every other request would have too: by the server's words, or by its status alone.
+    fn permanent_if(has_words: bool, hint: &str) -> Self {
+        if has_words {
+            Self::permanent(hint)
+        } else {
+            Self::of_status(hint)
         }
     }
 

@@ -74,7 +74,7 @@ pub(super) const CREDIT: [&str; 45] = [
 ];
 
 /// A limit of requests or tokens a time.
-pub(super) const RATE: [&str; 23] = [
+pub(super) const RATE: [&str; 25] = [
     "rate limit",
     "ratelimit",
     "rate-limit",
@@ -86,6 +86,8 @@ pub(super) const RATE: [&str; 23] = [
     "quota exceeded",
     "exceeded your quota",
     "requests per",
+    "request limit",
+    "qps limit",
     // Chinese, Japanese, Korean
     "限流",
     "过于频繁",

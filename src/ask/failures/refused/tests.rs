@@ -282,7 +282,7 @@ fn remedies_come_from_the_body() {
         (400, words("Invalid image for the model: 8 pixels"), NO_REMEDY, Request),
         (400, words("Image not found in the request to the model"), NO_REMEDY, Request),
         (400, words("最大令牌数量无效"), NO_REMEDY, Request),
-        (400, words("Your request has been blocked: the content violates the guardrails"), NO_REMEDY, Request),
+        (400, words("Your request has been blocked: the content violates the guardrails"), NO_REMEDY, Filtered),
         (403, words("This content is not allowed"), NO_REMEDY, Request),
         (400, words("频率惩罚参数错误"), NO_REMEDY, Request),
     ] {
