@@ -48,8 +48,8 @@ impl Pairs {
     ///   (`normal00733.png`, `low00733.png`).
     ///
     /// # Errors
-    /// If no pair is found, or two images of the same side have the same name.
-    pub(crate) fn open(folder: &Path, further: &[PathBuf]) -> Result<Self> {
+    /// If no pair is found, or two images of the same side have the same name. `other_folders` is the command's way to name two folders.
+    pub(crate) fn open(folder: &Path, further: &[PathBuf], other_folders: &str) -> Result<Self> {
         let root = Root::new(folder, further)?;
         let mut links_out = Vec::new();
         let entries = root.entries(folder, &mut links_out)?;
@@ -70,7 +70,9 @@ impl Pairs {
             }
         }
         Self::match_names(sides, unmatched).ok_or_else(|| {
-            let problem = "no pairs in it; expected are folders normal and low (or high and low, val_rgb_h and val_rgb_l), or files like normal1.png and low1.png; --normal DIR and --low DIR name any two folders";
+            let problem = format_args!(
+                "no pairs in it; expected are folders normal and low (or high and low, val_rgb_h and val_rgb_l), or files like normal1.png and low1.png; {other_folders}"
+            );
             Error::data(folder.display(), problem)
         })
     }
@@ -237,7 +239,7 @@ mod tests {
             &["normal1.png", "low1_low.png"],
         ] {
             let folder = folder(files);
-            let pairs = Pairs::open(folder.path(), &[]).unwrap();
+            let pairs = Pairs::open(folder.path(), &[], "").unwrap();
             assert_eq!(names(&pairs), ["1"], "{files:?}");
             assert!(pairs.unmatched.is_empty(), "{files:?}");
         }
@@ -248,7 +250,7 @@ mod tests {
         let others = ["YELLOW.png", "highway.png", "way.png", "yellow.png"];
         let files = [&["normal1.png", "low1.png"][..], &others].concat();
         let folder = folder(&files);
-        let pairs = Pairs::open(folder.path(), &[]).unwrap();
+        let pairs = Pairs::open(folder.path(), &[], "").unwrap();
         let unmatched: Vec<String> = pairs.unmatched.iter().map(|path| file_name(path)).collect();
         assert_eq!(
             (names(&pairs), unmatched),
@@ -265,7 +267,7 @@ mod tests {
             "high3.png",
             "x.png",
         ]);
-        let pairs = Pairs::open(folder.path(), &[]).unwrap();
+        let pairs = Pairs::open(folder.path(), &[], "").unwrap();
         let unmatched: Vec<String> = pairs.unmatched.iter().map(|path| file_name(path)).collect();
         assert_eq!(unmatched, ["high3.png", "low1_edited.png", "x.png"]);
     }
@@ -273,12 +275,14 @@ mod tests {
     #[test]
     fn missing_pairs_and_duplicate_names_are_errors() {
         let none = folder(&["a.png", "low/1.png"]);
-        let error = Pairs::open(none.path(), &[]).unwrap_err().to_string();
-        assert!(error.contains("--normal DIR"), "{error}");
+        let error = Pairs::open(none.path(), &[], "name two folders")
+            .unwrap_err()
+            .to_string();
+        assert!(error.ends_with("; name two folders"), "{error}");
         let two = folder(&["normal1.png", "low1.png", "low1.jpg"]);
-        let error = Pairs::open(two.path(), &[]).unwrap_err().to_string();
+        let error = Pairs::open(two.path(), &[], "").unwrap_err().to_string();
         assert!(error.contains("same name"), "{error}");
         let apart = folder(&["normal/1.png", "low/2.png"]);
-        assert!(Pairs::open(apart.path(), &[]).is_err());
+        assert!(Pairs::open(apart.path(), &[], "").is_err());
     }
 }

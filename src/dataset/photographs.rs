@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use super::frames::MissingFiles;
 use super::image_paths::{ImagePaths, is_image};
 use super::import_hint::with_import_hint;
+use super::ready_made::extraction_advice;
 use super::{DataPlace, Dataset, Root, SetArgs, frames, stem};
 use crate::error::{Error, Result};
 use crate::picture::image_file::format::SUPPORTED_FORMATS;
@@ -73,6 +74,11 @@ impl Photographs {
         let root = Root::new(folder, further)?;
         let mut scan = Scan::default();
         scan.add_folder(&root, folder)?;
+        let parquet = scan.files.iter().find(|path| {
+            path.extension()
+                .is_some_and(|name| name.eq_ignore_ascii_case("parquet"))
+        });
+        let parquet = parquet.and_then(|path| Some(extraction_advice(path.parent()?)));
         let found = ImagePaths::from_paths(scan.files);
         let mut sources = BTreeMap::new();
         for path in &found.images {
@@ -88,8 +94,10 @@ impl Photographs {
             let unread = found
                 .unsupported_note()
                 .map_or(String::new(), |unread| format!("; {unread}"));
-            let problem =
-                format_args!("no {SUPPORTED_FORMATS} image in this folder or below{unread}");
+            let parquet = parquet.map_or_else(String::new, |advice| "; ".to_owned() + &advice);
+            let problem = format_args!(
+                "no {SUPPORTED_FORMATS} image in this folder or below{unread}{parquet}"
+            );
             return Err(Error::data(folder.display(), problem));
         }
         found.warn_of_unsupported(folder);

@@ -74,7 +74,10 @@ impl PairFolders {
     fn open(&self, further: &[PathBuf]) -> Result<Pairs> {
         match self {
             Self::Two(normal, low) => Pairs::from_folders(normal, low, further),
-            Self::One(folder) => Pairs::open(folder, further),
+            Self::One(folder) => {
+                let other = "--pairs NORMAL,LOW names any two folders";
+                Pairs::open(folder, further, other)
+            }
         }
     }
 }

@@ -21,8 +21,8 @@ pub(crate) struct MapArgs {
     /// classes.json; default: that of the kind of data set
     #[arg(long, value_name = "NAME|FILE", add = Decides::Pixels)]
     pub labels: Option<String>,
-    /// The metres in one unit of depth PNG files: 0.001 for millimetres, 0.0002 for 1/5000 m; .npy files are in metres; default:
-    /// that of the kind of data set
+    /// The metres in one unit of depth: 0.001 for millimetres, 0.0002 for 1/5000 m, 10 for habitat-lab's 0..1 of 10 m; default: that
+    /// of the kind of data set, 1 for floats in .npy and HDF5
     #[arg(long, value_name = "METRES", value_parser = positive, add = Decides::Pixels)]
     pub depth_scale: Option<f64>,
     /// What depth is measured along; default: planar
@@ -151,6 +151,11 @@ pub(crate) trait Adapter: fmt::Debug + Sync {
     /// Name of the folder with the depth map of a frame, for data sets with several depth maps per frame; `None` for others.
     fn depth_folder(&self, _frame: &ListedFrame) -> Option<&'static str> {
         None
+    }
+
+    /// True if depth is taken as metres, because nothing states its unit: neither a publisher's page nor `--depth-scale`.
+    fn assumes_metres(&self) -> bool {
+        false
     }
 
     /// Files that are read besides the images: maps, and files about scenes or the data set.

@@ -125,6 +125,10 @@ impl Adapter for Combined {
         part.depth_folder(frame)
     }
 
+    fn assumes_metres(&self) -> bool {
+        self.parts.iter().any(|part| part.assumes_metres())
+    }
+
     fn other_files(&self) -> Vec<PathBuf> {
         self.parts
             .iter()

@@ -135,11 +135,20 @@ fn convert_ids<T: TryFrom<i128>>(array: Npy<'_>, noun: &str) -> Result<Array2<T>
     Array2::from_shape_vec(size, ids).map_err(|e| e.to_string())
 }
 
-/// Reads the depth in millimetres, in the size of the file.
+/// Reads the depth in millimetres, in the size of the file. `scale` is metres per unit: required for PNG, 1 by default for other files.
 pub(super) fn read_depth(path: &Path, scale: Option<f64>) -> Result<Array2<u32>> {
     let wrong = |problem: String| Error::data(path.display(), problem);
     if is_hdf5(path) {
-        return decode_hdf5_depth(&bytes(path)?).map_err(wrong);
+        let bytes = bytes(path)?;
+        return Hdf5Array::parse(&bytes, ARRAY)
+            .and_then(|array| decode_depth(array.numbers()?, scale))
+            .map_err(wrong);
+    }
+    if !is_png(path) {
+        let bytes = bytes(path)?;
+        return Npy::parse(&bytes)
+            .and_then(|array| decode_depth(array, scale))
+            .map_err(wrong);
     }
     let file = DepthFile::new(path.to_owned(), scale)
         .map_err(|problem| wrong(problem + " (--depth-scale METRES sets it)"))?;
@@ -147,19 +156,24 @@ pub(super) fn read_depth(path: &Path, scale: Option<f64>) -> Result<Array2<u32>>
     file.decode_any_size(&bytes).map_err(wrong)
 }
 
-/// Decodes an HDF5 file of depth in metres to millimetres.
-fn decode_hdf5_depth(file: &[u8]) -> Result<Array2<u32>, String> {
-    let array = Hdf5Array::parse(file, ARRAY)?;
-    let metres = array.numbers()?;
-    let size = metres.size;
-    let depths = metres
-        .floats()?
-        .map(|metres| millimetres(metres, 1_000.0))
-        .collect::<Result<Vec<u32>, String>>()?;
-    Array2::from_shape_vec(size, depths).map_err(|e| e.to_string())
+/// Converts depth to millimetres. `scale` is metres per unit; without it, the numbers must be floats, in metres.
+fn decode_depth(array: Npy<'_>, scale: Option<f64>) -> Result<Array2<u32>, String> {
+    let size = array.size;
+    let depths: Result<Vec<u32>, String> = match scale {
+        Some(scale) => array
+            .numbers()
+            .map(|units| millimetres(units, scale * 1_000.0))
+            .collect(),
+        None => array
+            .floats()
+            .map_err(|problem| problem + ", or the metres per unit: --depth-scale METRES")?
+            .map(|metres| millimetres(metres, 1_000.0))
+            .collect(),
+    };
+    Array2::from_shape_vec(size, depths?).map_err(|e| e.to_string())
 }
 
-/// Reads the depth of a frame in millimetres; `None` without a path. `scale` is metres per unit, for PNG files.
+/// Reads the depth of a frame in millimetres; `None` without a path. `scale` is as for [`read_depth`].
 ///
 /// # Errors
 /// If the file cannot be read or does not have the size of the image.
@@ -171,7 +185,6 @@ pub(super) fn read_frame_depth(
     let Some(path) = path else {
         return Ok(None);
     };
-    let scale = scale.filter(|_| is_png(path));
     let depth = read_depth(path, scale)?;
     check_same_size(path, &depth, rgb)?;
     Ok(Some(depth))

@@ -161,6 +161,10 @@ impl Adapter for Folder {
         &self.listing
     }
 
+    fn assumes_metres(&self) -> bool {
+        self.depth_scale.is_none()
+    }
+
     fn other_files(&self) -> Vec<PathBuf> {
         MapFiles::paths(&self.maps)
             .chain(&self.labels_file)

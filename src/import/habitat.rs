@@ -186,6 +186,10 @@ impl Adapter for Habitat {
         &self.listing
     }
 
+    fn assumes_metres(&self) -> bool {
+        self.depth_scale.is_none()
+    }
+
     fn other_files(&self) -> Vec<PathBuf> {
         map_paths(&self.maps)
             .chain(&self.scene_files)

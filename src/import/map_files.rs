@@ -23,7 +23,7 @@ impl MapFiles {
             .flatten()
     }
 
-    /// Reads the maps. `depth_scale` is metres per unit, for depth in PNG.
+    /// Reads the maps. `depth_scale` is metres per unit of depth, as for [`read_frame_depth`].
     ///
     /// # Errors
     /// If a file cannot be read or does not have the size of the image.

@@ -209,6 +209,9 @@ fn import_frames(args: &ImportArgs, progress: &Progress) -> Result<Outcome> {
             "no frame of it could be read",
         ));
     }
+    if adapter.assumes_metres() {
+        check_unit(&written)?;
+    }
     let note = depth_note(&written)?
         + &missing_maps_note(&written)
         + &depth_folders_note(&written)
@@ -264,6 +267,8 @@ struct WrittenFrame {
     line: Map<String, Value>,
     /// Median depth in millimetres; `None` without a depth map.
     depth: Option<u32>,
+    /// Greatest depth in millimetres; 0 without depth.
+    farthest: u32,
     /// Folder of the depth map, for data sets with several depths per frame.
     depth_folder: Option<&'static str>,
 }
@@ -330,6 +335,7 @@ fn write_frame(
         room,
     } = maps;
     let median = depth.as_ref().and_then(median);
+    let farthest = depth.iter().flatten().copied().max().unwrap_or(0);
     let depth_folder = adapter.depth_folder(frame);
     if let Some(depth) = &depth {
         output.write_depth(&mut line, depth, adapter.listing().depth_kind)?;
@@ -357,6 +363,7 @@ fn write_frame(
     Ok(WrittenFrame {
         line,
         depth: median,
+        farthest,
         depth_folder,
     })
 }
@@ -366,6 +373,23 @@ fn median(depth: &Array2<u32>) -> Option<u32> {
     let mut depths: Vec<u32> = depth.iter().copied().filter(|depth| *depth > 0).collect();
     let middle = depths.len().checked_sub(1)? / 2;
     Some(*depths.select_nth_unstable(middle).1)
+}
+
+/// Checks that depth without a stated unit is not normalised: values of 0..1 in all frames, as habitat-lab gives them by default, are
+/// either a share of the sensor's range or a scene of which nothing is farther than a metre.
+///
+/// # Errors
+/// If no depth is above 1.
+fn check_unit(written: &[WrittenFrame]) -> Result<()> {
+    let farthest = written.iter().map(|written| written.farthest).max();
+    let Some(farthest @ 1..=1_000) = farthest else {
+        return Ok(());
+    };
+    let problem = format_args!(
+        "all values are in 0..1 (the greatest is {}): depth normalised to the range of its sensor, as habitat-lab gives it by default (normalize_depth), or metres; state the metres of the value 1, for example --depth-scale 10 for habitat-lab's default of max_depth, or --depth-scale 1 for metres",
+        metres(farthest)
+    );
+    Err(Error::data("depth", problem))
 }
 
 /// The note about the typical depth.

@@ -789,6 +789,46 @@ pub fn normalised(mean: [f32; 3], std: [f32; 3]) -> Graph {
         .giving_image()
 }
 
+/// An enhancer that takes and gives values with a mean and a deviation for each channel.
+pub fn normalised_at_both_ends(mean: [f32; 3], std: [f32; 3]) -> Graph {
+    Graph::new()
+        .constant("mean", &[1, 3, 1, 1], &mean)
+        .constant("std", &[1, 3, 1, 1], &std)
+        .constant("zero", &[], &[0.0])
+        .constant("exponent", &[], &[0.4])
+        .node("Mul", &["input", "std"], "scaled")
+        .node("Add", &["scaled", "mean"], "unit")
+        .node("Max", &["unit", "zero"], "light")
+        .node("Pow", &["light", "exponent"], "enhanced")
+        .node("Sub", &["enhanced", "mean"], "centred")
+        .node("Div", &["centred", "std"], "output")
+        .giving_image()
+}
+
+/// An image whose brightness follows from the last bits of a product over all pixels: of the 3 channels with 24 copies of them.
+pub fn product_over_pixels() -> Graph {
+    Graph::new()
+        .shape("rows", &[3, -1])
+        .constant("many", &[], &[1e5])
+        .constant("half", &[], &[0.5])
+        .node("Reshape", &["input", "rows"], "queries")
+        .node_with(
+            "Concat",
+            &["queries"; 8],
+            "keys",
+            &[("axis", Attribute::Int(0))],
+        )
+        .node("Transpose", &["keys"], "columns")
+        .node("MatMul", &["queries", "columns"], "product")
+        .node("ReduceSum", &["product"], "sum")
+        .node("Mul", &["sum", "many"], "large")
+        .node("Sin", &["large"], "sine")
+        .node("Mul", &["sine", "half"], "swing")
+        .node("Add", &["swing", "half"], "factor")
+        .node("Mul", &["input", "factor"], "output")
+        .giving_image()
+}
+
 /// The image as elements of another type.
 pub fn cast(to: Type) -> Graph {
     Graph::new()

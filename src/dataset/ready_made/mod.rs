@@ -34,7 +34,7 @@ use crate::error::{Error, Result};
 use crate::types::{Family, FrameId, Question};
 
 pub(super) use choices::one_line;
-pub(super) use container::{Archive, is_set_folder};
+pub(super) use container::{Archive, extraction_advice, is_set_folder};
 pub(crate) use container::{ParquetColumns, cached_snapshot, refuse_lfs_pointer};
 pub(crate) use omissions::SkipBad;
 pub(super) use pictures::{EmbeddedImage, SceneNames, Series};
@@ -46,7 +46,7 @@ use cells::{Cell, Table};
 use choices::{ParsedQuestion, find_truths, is_native_format};
 use columns::map::{CellFormat, ColumnMap};
 use columns::names::Role;
-use columns::{FamilySource, Roles};
+use columns::{FamilySource, QuestionSource, Roles};
 use container::{FoundFiles, Joined, SetFile};
 use folder_info::FolderInfo;
 use groups::{GroupRule, Groups};
@@ -474,8 +474,11 @@ fn parse_rows(
     Ok((roles, set))
 }
 
-/// Adds the columns and an example of `--map image=…` to a problem, if no row has an image.
+/// Adds the columns and an example of `--map image=…` to a problem, if no row has an image; or how to take out images without questions.
 fn with_image_hint(table: &Table, roles: &Roles, problem: String) -> String {
+    if let (QuestionSource::Image, Some(advice)) = (&roles.question, columns::images_alone(table)) {
+        return format!("{problem}; {advice}");
+    }
     let has_images = table
         .rows
         .iter()

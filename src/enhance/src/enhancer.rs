@@ -13,7 +13,7 @@ use darkqa_ground::types::{Digest, EnhancerName, Rgb, SizeLog};
 use super::conventions::Description;
 use super::conventions::sidecar::{self, ADD};
 use super::failure::{RunFailure, describe_invalid_values, format_size};
-use super::files::{ModelFile, RandomOperators, traced_sizes};
+use super::files::{ModelFile, RandomOperators, computed_products, traced_sizes};
 use super::graphs::{Graph, GraphSource, LoadLimits, RunResult, Stopper};
 use super::inputs::DarkImage;
 use super::libraries::Runtime;
@@ -47,6 +47,29 @@ fn random_remark(random: &RandomOperators) -> Option<String> {
             names.join(", ")
         )
     })
+}
+
+/// Source of a model's graph, and the number of subnormal weights that were set to zero. Takes the bytes out of `file`.
+fn graph_source(
+    file: &mut ModelFile,
+    random: &RandomOperators,
+    has_wrong_shapes: bool,
+) -> Result<(GraphSource, usize)> {
+    if file.weights.external.is_empty() {
+        let flushed = file.weights.flush_subnormals(&mut file.bytes);
+        let bytes = random.with_seeds(std::mem::take(&mut file.bytes));
+        return Ok((GraphSource::Memory(bytes), flushed));
+    }
+    // ONNX Runtime locates external data relative to the model's path, so such a model is loaded from its file, without changes.
+    if !has_wrong_shapes {
+        return Ok((GraphSource::Path(file.path.clone()), 0));
+    }
+    let path = std::path::absolute(&file.path).map_err(|e| Error::file(&file.path, "locate", e))?;
+    let source = GraphSource::MemoryBeside {
+        bytes: std::mem::take(&mut file.bytes),
+        folder: path.with_file_name(""),
+    };
+    Ok((source, 0))
 }
 
 /// Side, in pixels, of a test image that should fit in memory with any model; chosen.
@@ -102,14 +125,15 @@ impl Enhancer {
         limits: LoadLimits,
     ) -> Result<Self> {
         let traced = traced_sizes(&file.bytes);
+        let has_wrong_shapes = file.leave_out_wrong_shapes();
         let random = RandomOperators::find(&file.bytes).unwrap_or_default();
-        // ONNX Runtime locates external data relative to the model's path, so such a model is loaded from its file, without changes.
-        let (source, flushed) = if file.weights.external.is_empty() {
-            let flushed = file.weights.flush_subnormals(&mut file.bytes);
-            (GraphSource::Memory(random.with_seeds(file.bytes)), flushed)
+        let products = computed_products(&file.bytes);
+        let threads = if products.is_empty() {
+            threads
         } else {
-            (GraphSource::Path(file.path.clone()), 0)
+            Some(NonZeroUsize::MIN)
         };
+        let (source, flushed) = graph_source(&mut file, &random, has_wrong_shapes)?;
         let graph = Graph::load(
             source,
             &file.sidecar,
@@ -149,6 +173,8 @@ impl Enhancer {
                 preset: file.preset,
                 has_assumed_ranges: false,
                 remarks,
+                one_thread: products,
+                has_wrong_shapes,
                 flushed,
             },
             usage: Usage::default(),

@@ -65,7 +65,7 @@ pub use libraries::{Install, Runtime, RuntimeSearch, disable_telemetry};
 pub use limits::{MemoryLimit, TimeLimit};
 pub use probes::{
     DARK, Examination, FRAMES, Findings, ImageOutput, ImageUse, Implausible, ProposedLine, Settled,
-    Usage, brightness, burnt_out,
+    Usage, brightness, burnt_out, shows_nothing,
 };
 pub use settings::{EnhancerArgs, ProbeArgs, RuntimeArgs, SizeArgs};
 pub use sizing::Tiling;

@@ -8,7 +8,7 @@ use crate::images::frames::Source;
 use crate::images::image_steps::ImageSteps;
 use crate::images::trials::SourcePlan;
 use crate::types::{Condition, EnhancerName, Rgb, Severity};
-use darkqa_enhance::{DARK, FRAMES, brightness};
+use darkqa_enhance::{DARK, FRAMES, brightness, shows_nothing};
 use darkqa_light::expose;
 
 /// Exposure drops that darken frames if the plan has too few dark ones; L3 is used first.
@@ -111,7 +111,7 @@ pub(crate) fn dark_frames(steps: ImageSteps<'_>, frames: &DarkFrames<'_>) -> Res
             if found.len() < FRAMES && round < conditions.len() {
                 let resolved = work.resolve(condition)?;
                 let image = resolved.work.degraded(resolved.condition.degradation())?;
-                if brightness(image) <= DARK {
+                if brightness(image) <= DARK && !shows_nothing(image) {
                     found.push(Rgb::clone(image));
                 }
             }
@@ -120,20 +120,28 @@ pub(crate) fn dark_frames(steps: ImageSteps<'_>, frames: &DarkFrames<'_>) -> Res
     for drop in DROPS {
         for work in &mut works {
             if found.len() < FRAMES {
-                found.push(expose(work.pixels()?, drop));
+                let image = expose(work.pixels()?, drop);
+                if !shows_nothing(&image) {
+                    found.push(image);
+                }
             }
         }
     }
     Ok(found)
 }
 
-/// Up to [`FRAMES`] images to probe an enhancer without a plan: the dark ones of `images`, then darkened copies.
+/// Up to [`FRAMES`] images to probe an enhancer without a plan: the dark ones of `images`, then darkened copies. Images that show nothing are
+/// left out.
 pub(crate) fn dark_or_darkened(images: &[Rgb]) -> Vec<Rgb> {
     let dark = images.iter().filter(|image| brightness(image) <= DARK);
     let darkened = DROPS
         .iter()
         .flat_map(|drop| images.iter().map(|image| expose(image, *drop)));
-    dark.cloned().chain(darkened).take(FRAMES).collect()
+    dark.cloned()
+        .chain(darkened)
+        .filter(|image| !shows_nothing(image))
+        .take(FRAMES)
+        .collect()
 }
 
 /// Up to `max` evenly spaced indices below `count`.
@@ -158,8 +166,11 @@ mod tests {
 
     #[test]
     fn bright_images_are_darkened_and_dark_ones_stay() {
-        let [dark, bright] = [20, 200].map(|code| Rgb::new(8, 8, vec![code; 192]).unwrap());
-        let all = dark_or_darkened(&[bright.clone(), dark.clone()]);
+        let [dark, bright] = [20, 200].map(|code| {
+            let samples = (0..192).map(|place| code + place / 24 * 5);
+            Rgb::new(8, 8, samples.collect()).unwrap()
+        });
+        let all = dark_or_darkened(&[Rgb::black(8, 8), bright.clone(), dark.clone()]);
         assert_eq!(all.len(), 6);
         assert_eq!(all[0], dark);
         assert!(all.iter().all(|image| brightness(image) <= DARK));

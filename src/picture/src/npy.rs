@@ -1,4 +1,4 @@
-//! Two-dimensional arrays in the `.npy` format of NumPy: [`Npy`].
+//! Two-dimensional arrays in the `.npy` format of NumPy: [`Npy`]. A third dimension of 1, as sensors of habitat-lab give it, is dropped.
 //!
 //! A file (`numpy.lib.format`) consists of `\x93NUMPY`, a version, the length of the header, the header, and the numbers row by
 //! row. The header is a Python dictionary with `descr`, `fortran_order` and `shape`. Versions 1 to 3 differ only in the
@@ -87,8 +87,10 @@ impl<'a> Npy<'a> {
                 "it is in Fortran order; save numpy.ascontiguousarray(array) instead".to_owned(),
             );
         }
-        let [rows, columns] = shape[..] else {
-            return Err(format!("its shape is {shape:?}; [height, width] expected"));
+        let ([rows, columns] | [rows, columns, 1] | [1, rows, columns]) = shape[..] else {
+            return Err(format!(
+                "its shape is {shape:?}; [height, width] expected, or one channel: [height, width, 1]"
+            ));
         };
         Self::new(descr, rows, columns, data)
     }
@@ -131,6 +133,16 @@ impl<'a> Npy<'a> {
                 Err("it holds integers; floats of 2, 4 or 8 bytes expected".to_owned())
             }
         }
+    }
+
+    /// The numbers, row by row, whatever their type.
+    pub fn numbers(self) -> impl Iterator<Item = f64> {
+        self.data
+            .chunks_exact(self.number_size)
+            .map(move |bytes| match self.numbers {
+                NumberForm::Floats(read) => read(bytes),
+                NumberForm::Integers(read) => read(bytes) as f64,
+            })
     }
 
     /// The integers, row by row; an error for floating-point numbers.

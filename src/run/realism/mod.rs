@@ -40,7 +40,8 @@ pub(crate) fn realism(args: &RealismArgs, progress: &Progress) -> Result<Outcome
         ),
         (folder, ..) => {
             let folder = folder.as_deref().unwrap_or(Path::new("."));
-            (Pairs::open(folder, &args.root.data_root)?, folder)
+            let other = "--normal DIR and --low DIR name any two folders, instead of PAIRS";
+            (Pairs::open(folder, &args.root.data_root, other)?, folder)
         }
     };
     let sensor = SensorSettings::resolve(&args.sensor)?;

@@ -561,6 +561,49 @@ fn folders_of_images_and_maps() {
     assert_eq!(twice.rgb, found.rgb);
 }
 
+/// A folder of two frames with depth of 0..1, and no other maps.
+fn normalised_depth(far: f32) -> Scene {
+    let scene = Scene::new();
+    for number in 0..2 {
+        scene.rgb(&format!("home/rgb/{number}.png"));
+        scene.metres(&format!("home/depth/{number}.npy"), 0.35, far);
+    }
+    scene
+}
+
+#[test]
+fn depth_of_0_to_1_needs_its_unit() {
+    let scene = normalised_depth(1.0);
+    insta::assert_snapshot!(redacted(&scene.refused("folder", &["--labels", "nyu40"])), @"
+    error: depth: all values are in 0..1 (the greatest is 1): depth normalised to the range of its sensor, as
+        habitat-lab gives it by default (normalize_depth), or metres; state the metres of the value 1, for example
+        --depth-scale 10 for habitat-lab's default of max_depth, or --depth-scale 1 for metres
+    ");
+    for (scale, sides_of_map) in [("10", (3_500, 10_000)), ("1", (350, 1_000))] {
+        let flags = ["--labels", "nyu40", "--force", "--depth-scale", scale];
+        let set = scene.import("folder", &flags);
+        assert_eq!(sides(frame(&set, "home/0").depth.as_ref()), sides_of_map);
+    }
+    // One value above 1 shows metres.
+    let metres = normalised_depth(1.2).import("folder", &["--labels", "nyu40"]);
+    assert_eq!(sides(frame(&metres, "home/0").depth.as_ref()), (350, 1_200));
+}
+
+#[test]
+fn integers_in_arrays_of_depth_need_their_unit() {
+    let scene = Scene::new();
+    scene.rgb("home/rgb/0.png");
+    let bytes = |value: u16| value.to_le_bytes().to_vec();
+    scene.npy("home/depth/0.npy", "<u2", 2_000, 3_000, bytes);
+    insta::assert_snapshot!(redacted(&scene.refused("folder", &["--labels", "nyu40"])), @"
+    ERROR home/0: [TMP]/src/home/depth/0.npy: it holds integers; floats of 2, 4 or 8 bytes expected, or the metres
+        per unit: --depth-scale METRES
+    error: [TMP]/src: no frame of it could be read
+    ");
+    let set = scene.import("folder", &["--labels", "nyu40", "--depth-scale", "0.001"]);
+    assert_eq!(sides(frame(&set, "home/0").depth.as_ref()), (2_000, 3_000));
+}
+
 #[test]
 fn array_class_maps_are_read() {
     let scene = Scene::new();

@@ -8,6 +8,7 @@ mod photographs;
 mod questions;
 mod ready_made;
 mod recordings;
+mod remedies;
 mod rooms;
 mod scenes;
 mod unlabelled;

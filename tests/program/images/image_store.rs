@@ -227,9 +227,9 @@ fn refused_enhancer_ignores_stored_images() {
     exit code: 2
     error: one.onnx: on 6 of 6 dark frames its images are flat (brightness varies by 0.0 of 255). No usual value
         range fits (0..1, 0..255, -1..1, -0.5..0.5, mean and std of ImageNet or CLIP); perhaps it needs another
-        `mean` and `std`, another output is the image, or the export has lost its weights. `darkqa-eval enhance
-        doctor one.onnx IMAGES… --out DIR` tries each value range and colour order; --allow bad-enhancer uses it
-        anyway
+        `mean` and `std` (or `mean_out` and `std_out`), another output is the image, or the export has lost its
+        weights. `darkqa-eval enhance doctor one.onnx IMAGES… --out DIR` tries each value range and colour order;
+        --allow bad-enhancer uses it anyway
     ");
 }
 
@@ -339,15 +339,14 @@ fn walks_share_their_images_too() {
     ask("--out alone");
     // The first frames of both walks are alike, so without noise they are one image.
     let first = ask("--images-cache images --out first");
-    insta::assert_snapshot!(redacted(&first), @"
+    insta::assert_snapshot!(redacted(&first), @r#"
      WARN 1 of 2 walks has fewer frames than --num-frames 3: they are shown several times in a request, as
         upstream does (the 2 frames of scannet-v0/001-b, for example)
-     WARN one: on 4 of 6 dark frames its images are flat (brightness varies by 0.0 of 255). No usual value range
-        fits (0..1, 0..255, -1..1, -0.5..0.5, mean and std of ImageNet or CLIP); perhaps it needs another `mean`
-        and `std`, another output is the image, or the export has lost its weights
+     WARN one: value ranges of 0..1 in and 0..1 out assumed, because nothing sets them; its images of dark frames
+        are plausible. To confirm, add to one.onnx.toml next to it: `range_in = "0..1"` and `range_out = "0..1"`
     image store images: 1 of 10 images read (0.0 MB), 0 measures and small copies; these took [TIME] to make; 9
         written (0.0 MB); it holds 0.00 of [MEMORY]
-    ");
+    "#);
     let second = ask("--images-cache images --out second");
     insta::assert_snapshot!(redacted(&second), @"
      WARN 1 of 2 walks has fewer frames than --num-frames 3: they are shown several times in a request, as

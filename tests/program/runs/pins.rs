@@ -399,7 +399,7 @@ fn enhanced_walks_use_batch_and_page() {
     let line = format!("{OPEN} {}", silent.base_url());
     let batch = format!("{line} --batch");
     let called = house.call(&words(&batch));
-    insta::assert_snapshot!(called, @"
+    insta::assert_snapshot!(called, @r#"
     exit code: 0
     stdout:
     9 requests in 1 file; 0 already answered, 0 waiting for an earlier batch
@@ -409,10 +409,10 @@ fn enhanced_walks_use_batch_and_page() {
     stderr:
      WARN 1 of 2 walks has fewer frames than --num-frames 3: they are shown several times in a request, as
         upstream does (the 2 frames of scannet-v0/001-b, for example)
-     WARN bright: on 4 of 6 dark frames its images are flat (brightness varies by 0.0 of 255). No usual value
-        range fits (0..1, 0..255, -1..1, -0.5..0.5, mean and std of ImageNet or CLIP); perhaps it needs another
-        `mean` and `std`, another output is the image, or the export has lost its weights
-    ");
+     WARN bright: value ranges of 0..1 in and 0..1 out assumed, because nothing sets them; its images of dark
+        frames are plausible. To confirm, add to bright.onnx.toml next to it: `range_in = "0..1"` and `range_out =
+        "0..1"`
+    "#);
     let requests = answer_batch(&house, "run/batch/1-m-001.jsonl", "It is brown");
     let mut light = BTreeMap::<String, Vec<f64>>::new();
     for trial in lines(&house.0.path("run/batch/trials.jsonl")) {

@@ -12,4 +12,5 @@ pub(super) use column::Column;
 pub(super) use family_source::FamilySource;
 pub(super) use roles::{
     ImageColumns, OptionsInQuestion, QuestionSource, Roles, describe_columns, find_column,
+    images_alone,
 };

@@ -16,6 +16,9 @@ use crate::types::shell_word;
 /// Dataset card of a repository.
 const CARD: &str = "README.md";
 
+/// List of the splits in a folder of Arrow files (Python package `datasets`, `DatasetDict.save_to_disk`).
+const ARROW_SPLITS: &str = "dataset_dict.json";
+
 /// Names of the tables of an image folder (Hugging Face, "ImageFolder").
 const METADATA: [&str; 3] = ["metadata.jsonl", "metadata.csv", "metadata.parquet"];
 
@@ -30,7 +33,16 @@ pub(super) fn is_set(tree: &Tree, files: &[PathBuf]) -> bool {
 
 /// True if the tree is a folder of Arrow files, as written by the Python package `datasets`.
 fn is_arrow(tree: &Tree) -> bool {
-    tree.has("state.json") && tree.has("dataset_info.json")
+    tree.has("state.json") && tree.has("dataset_info.json") || tree.has(ARROW_SPLITS)
+}
+
+/// Message about a folder of Arrow files, with the command that converts it. Its Parquet files are then read instead.
+fn arrow_problem(tree: &Tree) -> &'static str {
+    if tree.has(ARROW_SPLITS) {
+        "a folder of Arrow files by split, as save_to_disk writes it, which are not read; write Parquet: python -c \"import datasets; [split.to_parquet(name + '.parquet') for name, split in datasets.load_from_disk('.').items()]\" in it, then name the split: --read split=NAME"
+    } else {
+        "a folder of Arrow files, as save_to_disk writes it, which are not read; write Parquet: python -c \"import datasets; datasets.load_from_disk('.').to_parquet('set.parquet')\" in it"
+    }
 }
 
 /// Configurations in the card of a tree. If the card cannot be parsed, there are none, and a note says why.
@@ -64,9 +76,9 @@ pub(super) fn choose_files(
     files: Vec<PathBuf>,
     args: &SetArgs,
 ) -> Result<(Vec<Candidate>, Option<String>)> {
-    if is_arrow(tree) {
-        let problem = "a folder of Arrow files, which are not read; write Parquet: python -c \"import datasets; datasets.load_from_disk('.').to_parquet('set.parquet')\" in it";
-        return Err(Error::data(tree.place().display(), problem));
+    let has_parquet = files.iter().any(|path| extension(path) == "parquet");
+    if is_arrow(tree) && !has_parquet {
+        return Err(Error::data(tree.place().display(), arrow_problem(tree)));
     }
     let (configs, note) = card_configs(tree);
     let candidates = if configs.is_empty() {

@@ -24,6 +24,7 @@ use tempfile::NamedTempFile;
 use super::cells::{Cell, FileLabel, RowPlace, Step, Table};
 use crate::error::{Error, Result};
 use crate::files::reading;
+use crate::types::shell_word;
 
 pub(in crate::dataset) use archive::Archive;
 pub(in crate::dataset) use find::is_set_folder;
@@ -34,6 +35,17 @@ pub(crate) use tree::cached_snapshot;
 /// Supported file types, for messages.
 const SUPPORTED: &str =
     ".parquet, .tsv, .csv, .jsonl, .ndjson or .json (the texts also as .gz), or a .zip of these";
+
+/// Python program that writes the images of a Parquet file, or of a folder of them, into the folder `images`.
+const EXTRACT_IMAGES: &str = "import sys, pyarrow.parquet as p; t = p.read_table(sys.argv[1]); c = [n for n in t.column_names if 'binary' in str(t.schema.field(n).type)][0]; [open(f'images/{i:06}.' + ('png' if b[1:4] == b'PNG' else 'jpg'), 'wb').write(b) for i, b in enumerate(r if isinstance(r, bytes) else r['bytes'] for r in t[c].to_pylist() if r)]";
+
+/// Advice for a Parquet file, or a folder of them, whose images alone are wanted.
+pub(in crate::dataset) fn extraction_advice(place: &Path) -> String {
+    format!(
+        "to ask questions of your own (--ask) about its images, extract the images into a folder: mkdir images && python -c \"{EXTRACT_IMAGES}\" {}; then --data images",
+        shell_word(&place.to_string_lossy())
+    )
+}
 
 /// One file of a table.
 #[derive(Debug)]
@@ -90,6 +102,15 @@ impl SetFile {
             "jsonl" | "ndjson" => FileKind::JsonLines,
             "json" => FileKind::Json,
             "parquet" => FileKind::Parquet,
+            "arrow" => {
+                let name = path.file_name().unwrap_or_default().to_string_lossy();
+                let program = "import sys, datasets; datasets.Dataset.from_file(sys.argv[1]).to_parquet('set.parquet')";
+                let problem = format_args!(
+                    "an Arrow file, which is not read; write Parquet: python -c \"{program}\" {} in its folder",
+                    shell_word(&name)
+                );
+                return Err(Error::data(path.display(), problem));
+            }
             _ => {
                 let problem = format_args!("not a file of questions: {SUPPORTED} expected");
                 return Err(Error::data(path.display(), problem));

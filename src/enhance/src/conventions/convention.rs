@@ -164,7 +164,7 @@ impl fmt::Display for ValueRange {
 }
 
 /// Usual normalisation of values in 0..1 by a mean and a standard deviation.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Normalisation {
     /// Mean and standard deviation of ImageNet, as in `torchvision.models`.
     ImageNet,
@@ -172,12 +172,15 @@ pub(crate) enum Normalisation {
     Centred,
     /// Mean and standard deviation of CLIP, as in its `clip.load` (<https://github.com/openai/CLIP>, `clip/clip.py`).
     Clip,
+    /// Other means and standard deviations, those that are stated for the input.
+    Stated([[f32; 3]; 2]),
 }
 
 impl Normalisation {
     /// Means and standard deviations of red, green and blue.
     pub(super) fn mean_and_std(self) -> [[f32; 3]; 2] {
         match self {
+            Self::Stated(mean_and_std) => mean_and_std,
             Self::ImageNet => [[0.485, 0.456, 0.406], [0.229, 0.224, 0.225]],
             Self::Centred => [[0.5; 3], [1.0; 3]],
             Self::Clip => [
@@ -189,7 +192,7 @@ impl Normalisation {
 }
 
 /// Scale of the values of an image tensor: a plain range, or 0..1 normalised by a mean and a standard deviation.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum ValueScale {
     Range(ValueRange),
     Normalised(Normalisation),
@@ -231,6 +234,9 @@ impl fmt::Display for ValueScale {
             }
             Self::Normalised(Normalisation::Clip) => {
                 f.write_str("0..1 with the mean and std of CLIP")
+            }
+            Self::Normalised(Normalisation::Stated(_)) => {
+                f.write_str("0..1 with the mean and std that are set")
             }
             Self::Normalised(Normalisation::Centred) => f.write_str("-0.5..0.5 (mean 0.5, std 1)"),
         }

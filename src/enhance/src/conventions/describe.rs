@@ -1,5 +1,6 @@
 //! Description of a model's convention for users, with the source of each value: [`Description`].
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -27,6 +28,10 @@ pub(crate) struct Description {
     pub(crate) has_assumed_ranges: bool,
     /// Caveats for readers of the results, as sentences that follow the model's name.
     pub(crate) remarks: Vec<String>,
+    /// Operators for which the graph runs on one thread.
+    pub(crate) one_thread: BTreeSet<String>,
+    /// True if the shapes of intermediate tensors in the file were left out.
+    pub(crate) has_wrong_shapes: bool,
     /// Number of subnormal weights that were set to zero.
     pub(crate) flushed: usize,
 }
@@ -56,6 +61,18 @@ impl Description {
         }
         if let Some(differences) = &graph.preset_differences {
             lines.add("warning", differences, "graph");
+        }
+        if !self.one_thread.is_empty() {
+            let names: Vec<&str> = self.one_thread.iter().map(String::as_str).collect();
+            let source = format!(
+                "graph: {} of two computed matrices, whose last bits may depend on the threads",
+                names.join(", ")
+            );
+            lines.add("threads per image", 1, source);
+        }
+        if self.has_wrong_shapes {
+            let source = "graph: exporters write wrong shapes for Fourier transforms";
+            lines.add("value_info", "left out", source);
         }
         self.input(&mut lines, graph, convention);
         self.output(&mut lines, graph);

@@ -7,11 +7,9 @@ pub(super) mod preset;
 pub(super) mod sidecar;
 mod signature;
 
-#[cfg(test)]
-pub(super) use convention::Normalisation;
 pub(super) use convention::{
-    ChannelOrder, Channels, ElementType, LUMA, Locality, Padding, Rounding, TensorLayout,
-    ValueRange, ValueScale,
+    ChannelOrder, Channels, ElementType, LUMA, Locality, Normalisation, Padding, Rounding,
+    TensorLayout, ValueRange, ValueScale,
 };
 pub(super) use describe::Description;
 pub(super) use extra::{ExtraValue, NoiseStatement, Number};

@@ -200,6 +200,12 @@ impl ModelSidecar {
         }
     }
 
+    /// Means and standard deviations of the input; `None` if neither is stated.
+    pub(crate) fn mean_and_std_in(&self) -> Option<[[f32; 3]; 2]> {
+        let is_stated = self.mean.is_some() || self.std.is_some();
+        is_stated.then(|| [self.mean.unwrap_or([0.0; 3]), self.std.unwrap_or([1.0; 3])])
+    }
+
     /// Means and standard deviations of the output; `None` if neither is stated.
     pub(crate) fn mean_and_std_out(&self) -> Option<[[f32; 3]; 2]> {
         let is_stated = self.mean_out.is_some() || self.std_out.is_some();

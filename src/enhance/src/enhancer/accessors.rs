@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::Enhancer;
 use crate::conventions::sidecar::{self, ModelSidecar};
-use crate::conventions::{Channels, ValueRange, ValueScale};
+use crate::conventions::{Channels, Normalisation, ValueRange, ValueScale};
 use crate::graphs::Graph;
 use crate::probes::{RangePair, Usage};
 use crate::sizing::AcceptedSizes;
@@ -83,19 +83,36 @@ impl Enhancer {
             && sidecar.color_out.is_none()
     }
 
-    /// True if the model may expect an input normalised by a mean and a deviation: an RGB input, for which neither a range nor any
-    /// normalisation is stated.
-    pub(crate) fn may_be_normalised(&self, range_in: Option<ValueRange>) -> bool {
+    /// Scales of input and output to try: all, unless a range is given or the convention states a normalisation. Where the input's
+    /// normalisation is stated, the output may have the same.
+    pub(crate) fn scales_to_try(
+        &self,
+        range_in: Option<ValueRange>,
+        range_out: Option<ValueRange>,
+    ) -> [Vec<ValueScale>; 2] {
         let convention = self.convention();
-        let stated = [
-            convention.mean,
-            convention.std,
-            convention.mean_out,
-            convention.std_out,
-        ];
-        range_in.is_none()
-            && stated.iter().all(Option::is_none)
-            && convention.channels.unwrap_or_default() == Channels::Rgb
+        let ranges = self.ranges();
+        let is_rgb = convention.channels.unwrap_or_default() == Channels::Rgb;
+        let mean_and_std_in = convention.mean_and_std_in();
+        let try_all = |range: Option<ValueRange>, is_stated: bool, stated: ValueScale| match range {
+            None if is_rgb && !is_stated => ValueScale::ALL.to_vec(),
+            None => vec![stated],
+            Some(range) => vec![ValueScale::Range(range)],
+        };
+        let is_stated_out = convention.mean_and_std_out().is_some();
+        let same = mean_and_std_in
+            .map(|stated| ValueScale::Normalised(Normalisation::Stated(stated)))
+            .filter(|_| ranges.input.range() == ValueRange::Unit);
+        let stated_in = same.unwrap_or(ranges.input);
+        let inputs = try_all(range_in, mean_and_std_in.is_some(), stated_in);
+        let mut outputs = try_all(range_out, is_stated_out, ranges.output);
+        let is_known = outputs
+            .iter()
+            .any(|known| known.mean_and_std() == mean_and_std_in);
+        if is_rgb && range_out.is_none() && !is_stated_out && !is_known {
+            outputs.extend(same);
+        }
+        [inputs, outputs]
     }
 
     /// Adds a caveat for readers of the results: a sentence that follows the model's name.

@@ -13,6 +13,7 @@ use darkqa_ground::types::{Digest, EnhancerName};
 
 use super::built_in::find_built_in;
 use super::protobuf::byte_fields;
+use super::value_info::without_value_info;
 use super::weights::Weights;
 use crate::conventions::preset::{Preset, PresetOutputs};
 use crate::conventions::sidecar::{self, ModelSidecar, OutputChoice};
@@ -129,6 +130,16 @@ impl ModelFile {
     #[must_use]
     pub fn name(&self) -> &EnhancerName {
         &self.name
+    }
+
+    /// Leaves the shapes of intermediate tensors out of a model with a Fourier transform; returns true if it had such shapes.
+    pub(crate) fn leave_out_wrong_shapes(&mut self) -> bool {
+        let Some(bytes) = without_value_info(&self.bytes) else {
+            return false;
+        };
+        self.weights = Weights::find(&bytes).unwrap_or_default();
+        self.bytes = bytes;
+        true
     }
 
     /// Path of the file; for a built-in enhancer, its name in messages.

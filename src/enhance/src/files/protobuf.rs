@@ -40,6 +40,21 @@ pub(super) fn byte_fields(
     })
 }
 
+/// Appends a length-delimited field to a message.
+pub(super) fn push_bytes(message: &mut Vec<u8>, number: u64, bytes: &[u8]) {
+    push_varint(message, number << 3 | 2);
+    push_varint(message, bytes.len() as u64);
+    message.extend(bytes);
+}
+
+fn push_varint(message: &mut Vec<u8>, mut value: u64) {
+    while value > 127 {
+        message.push(value as u8 | 0x80);
+        value >>= 7;
+    }
+    message.push(value as u8);
+}
+
 /// Iterator returned by [`fields`].
 pub(super) struct Fields<'a> {
     /// The buffer up to the end of the message.

@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use super::onnx_message::OnnxMessage;
-use super::protobuf::{FieldValue, Malformed, fields};
+use super::protobuf::{FieldValue, Malformed, fields, push_bytes};
 
 /// Random operators, whose attribute `seed` is a float.
 const SEEDED_BY_FLOAT: [&str; 6] = [
@@ -222,21 +222,6 @@ fn seed_attribute(operator: &str) -> Vec<u8> {
         attribute.extend([0xa0, 0x01, FLOAT]);
     }
     attribute
-}
-
-/// Appends a length-delimited field.
-fn push_bytes(message: &mut Vec<u8>, number: u64, bytes: &[u8]) {
-    push_varint(message, number << 3 | 2);
-    push_varint(message, bytes.len() as u64);
-    message.extend(bytes);
-}
-
-fn push_varint(message: &mut Vec<u8>, mut value: u64) {
-    while value > 127 {
-        message.push(value as u8 | 0x80);
-        value >>= 7;
-    }
-    message.push(value as u8);
 }
 
 #[cfg(test)]

@@ -212,9 +212,17 @@ fn repeat<T: Copy>(values: Vec<T>, times: usize) -> Vec<T> {
     }
 }
 
+/// Session option for the folder of external data, of a model in memory (`onnxruntime_session_options_config_keys.h`).
+const EXTERNAL_FOLDER: &str = "session.model_external_initializers_file_folder_path";
+
 /// Source of the graph of a session.
 pub(crate) enum GraphSource {
     Memory(Vec<u8>),
+    /// The bytes of a model, and the folder of its external data.
+    MemoryBeside {
+        bytes: Vec<u8>,
+        folder: PathBuf,
+    },
     Path(PathBuf),
 }
 
@@ -222,6 +230,12 @@ impl GraphSource {
     pub(super) fn commit(self, mut builder: SessionBuilder) -> ort::Result<Session> {
         match self {
             Self::Memory(bytes) => builder.commit_from_memory(&bytes),
+            Self::MemoryBeside { bytes, folder } => {
+                let folder = folder.to_string_lossy();
+                builder
+                    .with_config_entry(EXTERNAL_FOLDER, folder)?
+                    .commit_from_memory(&bytes)
+            }
             Self::Path(path) => builder.commit_from_file(path),
         }
     }

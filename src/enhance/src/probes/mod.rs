@@ -16,7 +16,7 @@ pub use burnt_out::burnt_out;
 pub use doctor::{Examination, ImageOutput, ProposedLine, Settled};
 pub use findings::Findings;
 pub(super) use plausible::UnclampedImage;
-pub use plausible::{DARK, brightness};
+pub use plausible::{DARK, brightness, shows_nothing};
 pub use probe::FRAMES;
 pub(super) use range_pair::RangePair;
 pub use usage::{ImageUse, Implausible, Usage};

@@ -258,6 +258,15 @@ pub fn brightness(image: &Rgb) -> f64 {
         / pixels
 }
 
+/// Maximum range of brightness, in codes, of an image that shows nothing, without its darkest and brightest 1 %; chosen.
+const MAX_EMPTY_RANGE: f64 = 1.0;
+
+/// True if an image shows nothing, such as a black photograph: the right output for it has no content either, so it tests no enhancer.
+pub fn shows_nothing(image: &Rgb) -> bool {
+    let luma = UnclampedImage::downscaled(image).luma().samples;
+    percentile(&luma, 1.0 - DARKEST_SHARE) - percentile(&luma, DARKEST_SHARE) <= MAX_EMPTY_RANGE
+}
+
 /// First flaw found in an output for a dark image of the same size; `None` if the output is plausible.
 pub(super) fn judge(dark: &UnclampedImage, output: &UnclampedImage) -> Option<Verdict> {
     let not_finite = share(&output.samples, |value| !value.is_finite());

@@ -324,7 +324,7 @@ impl Probe {
             ),
             (Flaw::White | Flaw::Haze, StatedRanges::Neither | StatedRanges::One) => {
                 format!(
-                    "{NONE_FITS}; {ADD} `range_in`, `mean`, `std` and `range_out` of the model's code"
+                    "{NONE_FITS}; {ADD} `range_in`, `mean`, `std`, `range_out`, `mean_out` and `std_out` of the model's code"
                 )
             }
             (flaw, ranges) => remedy(flaw, ranges),
@@ -365,13 +365,13 @@ fn remedy(flaw: Flaw, ranges: StatedRanges) -> String {
             "Check `range_in` in MODEL.onnx.toml, because values that are too large can cause this; else its weights and its divisions by zero".to_owned()
         }
         (_, StatedRanges::Both) => {
-            "Check `range_in`, `range_out` and `output` in MODEL.onnx.toml, and the preset".to_owned()
+            "Check `range_in`, `range_out`, `mean_out`, `std_out` and `output` in MODEL.onnx.toml, and the preset".to_owned()
         }
         (_, StatedRanges::One) => {
             "One range is set, by MODEL.onnx.toml or the element type, and no other fits it; without a line in that file all are tried".to_owned()
         }
         (_, StatedRanges::Neither) => format!(
-            "{NONE_FITS}; perhaps it needs another `mean` and `std`, another output is the image, or the export has lost its weights"
+            "{NONE_FITS}; perhaps it needs another `mean` and `std` (or `mean_out` and `std_out`), another output is the image, or the export has lost its weights"
         ),
     }
 }

@@ -34,6 +34,11 @@ impl Enhancer {
     /// # Errors
     /// If the images are implausible or the ranges ambiguous, unless implausible images are accepted. The message proposes sidecar lines.
     pub fn probe(&mut self, dark: &[Rgb], implausible: Implausible) -> Result<()> {
+        if dark.is_empty() {
+            let name = self.name();
+            tracing::warn!("{name}: its images were not checked, because the frames show nothing");
+            return Ok(());
+        }
         let mut trials = self.trials(dark, [self.convention()], self.stated_ranges())?;
         if let (None, Some(frame)) = (&trials, dark.first()) {
             // The model may accept the frame's own size, or its accepted sizes are found by trial.
@@ -201,8 +206,9 @@ impl Enhancer {
             });
             let usual_pair = probes[0].usual_pair();
             if usual_pair.is_none_or(|pair| pair.verdict().is_some()) {
-                if !self.is_dim(&probes[0], conventions[0])? && self.may_be_normalised(input) {
-                    let pairs = RangePair::normalised(input, output);
+                if !self.is_dim(&probes[0], conventions[0])? {
+                    let [inputs, outputs] = self.scales_to_try(input, output);
+                    let pairs = RangePair::normalised(&inputs, &outputs);
                     for fed_alike in pairs.chunk_by(|a, b| a.input == b.input) {
                         // The plain ranges have shown that this size works, so a failure here is no reason to try another.
                         let more = self.pair_trials(&frames, conventions, fed_alike)?;

@@ -5,7 +5,7 @@ use std::fmt;
 use crate::conventions::{ValueRange, ValueScale};
 
 /// Scale of the values of a model's input, and that of its output.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct RangePair {
     pub(crate) input: ValueScale,
     pub(crate) output: ValueScale,
@@ -18,12 +18,9 @@ impl RangePair {
         pairs(&scales(input, &ranges), &scales(output, &ranges))
     }
 
-    /// All pairs that are normalised by a mean and a deviation on at least one side; `None` stands for every scale.
-    pub(super) fn normalised(input: Option<ValueRange>, output: Option<ValueRange>) -> Vec<Self> {
-        let mut all = pairs(
-            &scales(input, &ValueScale::ALL),
-            &scales(output, &ValueScale::ALL),
-        );
+    /// All pairs of these scales that are normalised by a mean and a deviation on at least one side.
+    pub(super) fn normalised(inputs: &[ValueScale], outputs: &[ValueScale]) -> Vec<Self> {
+        let mut all = pairs(inputs, outputs);
         all.retain(|pair| !pair.is_plain());
         all
     }
@@ -128,8 +125,9 @@ mod tests {
         assert_eq!(RangePair::plain(None, None).len(), 9);
         assert_eq!(RangePair::plain(Some(ValueRange::Signed), None).len(), 3);
         assert_eq!(RangePair::plain(unit, unit).len(), 1);
-        assert_eq!(RangePair::normalised(None, None).len(), 27);
-        assert_eq!(RangePair::normalised(None, unit).len(), 3);
-        assert!(RangePair::normalised(unit, unit).is_empty());
+        let (all, plain) = (ValueScale::ALL, [ValueScale::Range(ValueRange::Unit)]);
+        assert_eq!(RangePair::normalised(&all, &all).len(), 27);
+        assert_eq!(RangePair::normalised(&all, &plain).len(), 3);
+        assert!(RangePair::normalised(&plain, &plain).is_empty());
     }
 }

@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use serde::{Deserialize, Serialize};
 
 use super::burnt_out::burnt_out;
-use super::plausible::{DARK, Gravity, UnclampedImage, Verdict, brightness, judge};
+use super::plausible::{DARK, Gravity, UnclampedImage, Verdict, brightness, judge, shows_nothing};
 use darkqa_ground::error::{Error, Result};
 use darkqa_ground::types::manifests::{ConventionLine, ELSEWHERE, EnhancerNote, FlawedImage};
 use darkqa_ground::types::{Digest, Rgb, SizeLog};
@@ -33,7 +33,7 @@ pub enum Implausible {
 /// Judgement of one enhanced image.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(super) enum Judgement {
-    /// Not judged, because the degraded image is bright; good models fail the rules on bright images.
+    /// Not judged, because the degraded image is bright, where good models fail the rules, or because it shows nothing.
     #[default]
     Bright,
     /// Flaw of the enhanced image, if any; the degraded image is dark.
@@ -43,7 +43,7 @@ pub(super) enum Judgement {
 impl Judgement {
     /// Compares the enhanced image with the degraded one.
     pub(super) fn on([degraded, made]: [&Rgb; 2]) -> Self {
-        if brightness(degraded) > DARK {
+        if brightness(degraded) > DARK || shows_nothing(degraded) {
             Self::Bright
         } else {
             Self::Dark(judge(
@@ -370,6 +370,14 @@ mod tests {
         );
         let stored = serde_json::to_value(&good).unwrap();
         assert_eq!(stored.get("white"), None);
+    }
+
+    #[test]
+    fn black_frames_are_not_judged() {
+        let black = Rgb::black(96, 96);
+        assert_eq!(Judgement::on([&black, &black]), Judgement::Bright);
+        let dark = Judgement::on([&squares(1.0), &black]);
+        assert!(matches!(dark, Judgement::Dark(Some(_))), "{dark:?}");
     }
 
     #[test]

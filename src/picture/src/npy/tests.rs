@@ -37,6 +37,20 @@ fn every_version_is_read() {
 }
 
 #[test]
+fn one_channel_is_dropped() {
+    for shape in ["(2, 3, 1)", "(1, 2, 3)", "(2, 3)"] {
+        let bytes = array("|u1", shape, &[1, 2, 3, 4, 5, 6]);
+        let npy = Npy::parse(&bytes).unwrap();
+        assert_eq!(npy.size, (2, 3), "{shape}");
+        assert_eq!(npy.numbers().last(), Some(6.0));
+    }
+    for shape in ["(2, 1, 3)", "(1, 2, 3, 1)", "(6,)"] {
+        let problem = Npy::parse(&array("|u1", shape, &[0; 6])).unwrap_err();
+        assert!(problem.contains("[height, width, 1]"), "{problem}");
+    }
+}
+
+#[test]
 fn every_integer_is_read() {
     for (descr, data, expected) in [
         ("|i1", vec![0xff, 2], [-1, 2]),

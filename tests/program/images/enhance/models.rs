@@ -1,9 +1,11 @@
 //! Graphs: what each computes, and those that are refused.
 
-use darkqa_enhance::ModelFile;
+use std::num::NonZeroUsize;
+
+use darkqa_enhance::{Enhancer, ModelFile};
 use darkqa_ground::types::Rgb;
 
-use super::{fault, image, loaded, map, open, stated};
+use super::{fault, image, loaded, map, open, runtime, stated};
 use crate::support::onnx::Size::{Known, Named};
 use crate::support::onnx::{self, Graph, Type};
 use crate::support::snapshot::redacted;
@@ -51,6 +53,25 @@ fn subnormal_weights_count_as_zero() {
     assert_eq!(subnormal.enhance(&image).unwrap(), image);
     let (_folder, mut normal) = loaded(&onnx::weight(2e-38));
     assert_eq!(normal.enhance(&image).unwrap(), map(&image, |x| x + 2.0));
+}
+
+#[test]
+fn products_of_computed_matrices_give_the_same_bytes_on_any_number_of_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = onnx::product_over_pixels().write(folder.path(), "model.onnx");
+    let image = image(240, 320);
+    let on = |threads| {
+        let file = ModelFile::read(&path).unwrap();
+        let mut enhancer = Enhancer::open(file, &runtime(), NonZeroUsize::new(threads)).unwrap();
+        (enhancer.enhance(&image).unwrap(), enhancer.describe())
+    };
+    let (one, described) = on(1);
+    assert_eq!(one, on(2).0);
+    assert_eq!(one, on(4).0);
+    let line = "threads per image  1 ";
+    assert!(described.contains(line), "{described}");
+    let described = loaded(&onnx::gain(2.0)).1.describe();
+    assert!(!described.contains("threads per image"), "{described}");
 }
 
 #[test]

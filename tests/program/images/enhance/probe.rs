@@ -193,6 +193,31 @@ fn a_normalised_input_is_found() {
 }
 
 #[test]
+fn an_output_normalised_like_the_stated_input_is_found() {
+    for [mean, std] in [
+        [[0.485, 0.456, 0.406], [0.229, 0.224, 0.225]],
+        [[0.4, 0.3, 0.3], [0.2, 0.25, 0.2]],
+    ] {
+        let graph = onnx::normalised_at_both_ends(mean, std);
+        let stated = format!("mean = {mean:?}\nstd = {std:?}\n");
+        let called = ask(&bench(&graph, &stated), "");
+        assert_eq!(called.code, Some(2), "{called:?}");
+        let message = called
+            .stderr
+            .split_whitespace()
+            .collect::<Vec<_>>()
+            .join(" ");
+        let lines = format!("{stated}mean_out = {mean:?}\nstd_out = {std:?}\n");
+        for line in lines.lines() {
+            assert!(message.contains(&format!("`{line}`")), "{line}: {message}");
+        }
+        // The proposed lines mend it.
+        let called = ask(&bench(&graph, &lines), "");
+        assert_eq!(called.code, Some(0), "{called:?}");
+    }
+}
+
+#[test]
 fn black_and_white_reveal_mixed_ranges() {
     let centred = [-0.5, 0.5];
     let clip = [

@@ -218,7 +218,8 @@ fn broken_pair_does_not_stop_others() {
     realism pairs/low
       exit code: 2
       error: pairs/low: no pairs in it; expected are folders normal and low (or high and low, val_rgb_h and
-          val_rgb_l), or files like normal1.png and low1.png; --normal DIR and --low DIR name any two folders
+          val_rgb_l), or files like normal1.png and low1.png; --normal DIR and --low DIR name any two folders,
+          instead of PAIRS
     realism pairs --ev 99
       exit code: 2
       error: invalid value '99' for '--ev <EV>': a number from -20 to 20 expected

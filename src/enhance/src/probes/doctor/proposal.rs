@@ -166,6 +166,6 @@ pub(super) fn propose(
         return found;
     }
     Proposal::without_lines(
-        "No value range or colour order gives plausible images. Perhaps another output is the image, the dimensions have another order, or the export has lost its weights.".to_owned(),
+        "No value range or colour order gives plausible images. Perhaps it needs the `mean` and `std`, or `mean_out` and `std_out`, of its code, another output is the image, the dimensions have another order, or the export has lost its weights.".to_owned(),
     )
 }
