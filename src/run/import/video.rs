@@ -6,7 +6,8 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::frame_writer::{ChosenFrame, FrameSource, FrameWriter, summary};
-use super::recording::{WrittenArgs, drive_name, warn_of_missed};
+use super::mcap_files::drive_name;
+use super::recording::{WrittenArgs, warn_of_missed};
 use crate::error::{Error, Result};
 use crate::images::progress::Progress;
 use crate::images::workers::pool;
@@ -93,6 +94,7 @@ pub(crate) fn import(args: &VideoArgs, progress: &Progress) -> Result<Outcome> {
                 topic: path.clone(),
                 name,
                 place,
+                time: frame.time,
                 log_time: frame.time,
                 source: FrameSource::Image(frame.image),
             };

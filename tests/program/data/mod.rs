@@ -3,6 +3,7 @@
 mod hm3d;
 mod import;
 mod inputs;
+mod odd_recordings;
 mod photographs;
 mod questions;
 mod ready_made;
