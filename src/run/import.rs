@@ -1,17 +1,18 @@
 //! `import`: writes the frames of another data set in the common interface.
 
 mod camera_facts;
+mod conversion;
 mod frame_writer;
 mod lerobot;
 mod lerobot_frames;
 mod mcap_files;
+mod message_times;
 mod recording;
 mod topic_list;
 mod video;
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::io::{ErrorKind, Read as _};
 use std::path::{Component, Path, PathBuf};
 
 use clap::{Args, Subcommand};
@@ -19,6 +20,7 @@ use ndarray::Array2;
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 
+use self::conversion::{conversion, not_a_bag};
 use crate::dataset::FolderArgs;
 use crate::dataset::frame_folder::{self, FrameOutput};
 use crate::error::{Error, Result};
@@ -36,7 +38,7 @@ use crate::runs::Outcome;
 use crate::text::words::first_names;
 use crate::types::manifests::Status;
 use crate::types::text::counted;
-use crate::types::{Decides, FrameId, InputNote, Rgb, shell_word};
+use crate::types::{Decides, FrameId, InputNote, Rgb};
 
 /// Plausible typical depths of indoor frames, in millimetres (chosen). Outside this range, the depth scale is probably wrong.
 const ROOM_DEPTHS: std::ops::RangeInclusive<u32> = 300..=15_000;
@@ -70,7 +72,7 @@ enum ImportForm {
     },
     /// Take frames of a recording of a robot (ROS 2, Foxglove); without --out, list its topics with images
     Mcap(Box<recording::McapArgs>),
-    /// Show how a bag of ROS 1 is converted into a file that `import mcap` reads
+    /// Show how a bag of ROS 1 or 2 is converted into a file that `import mcap` reads
     Rosbag {
         /// The bag
         #[arg(value_name = "FILE", add = Decides::Nothing)]
@@ -142,27 +144,16 @@ fn print_script(kind: DataSetKind) -> Result<Outcome> {
     Ok(Outcome::text(Status::Complete, HM3D_SCRIPT.to_owned()))
 }
 
-/// The error that explains how to convert a ROS 1 bag. Bags are not read directly, because the crate rosbag (0.6.3) maps whole files into
+/// The error that explains how to convert a bag. Bags of ROS 1 are not read directly, because the crate rosbag (0.6.3) maps whole files into
 /// memory and needs bzip2 and lz4 in C.
 ///
 /// # Errors
 /// If the file cannot be read.
 fn rosbag_error(file: &Path) -> Result<Error> {
-    let mut start = [0; 7];
-    let read = open(file).and_then(|mut file| file.read_exact(&mut start));
-    match read {
-        Err(e) if e.kind() != ErrorKind::UnexpectedEof => return Err(Error::file(file, "read", e)),
-        _ if start != *b"#ROSBAG" => {
-            let problem = "not a bag of ROS 1; recordings in MCAP: darkqa-eval import mcap FILE";
-            return Ok(Error::data(file.display(), problem));
-        }
-        _ => {}
+    if !file.is_dir() {
+        open(file).map_err(|e| Error::file(file, "read", e))?;
     }
-    let new = file.with_extension("");
-    let [old, new] = [file, &*new].map(|path| shell_word(&path.to_string_lossy()).into_owned());
-    let problem = format_args!(
-        "bags of ROS 1 are not read; convert it, which changes no image:\n  pip install rosbags\n  rosbags-convert --src {old} --dst {new} --dst-storage mcap\n  darkqa-eval import mcap {new}"
-    );
+    let problem = conversion(file).unwrap_or_else(|| not_a_bag(file));
     Ok(Error::data(file.display(), problem))
 }
 

@@ -122,9 +122,9 @@ fn intrinsics(matrix: &[f64], columns: usize) -> Option<Intrinsics> {
 struct JsonCamera {
     width: usize,
     height: usize,
-    #[serde(rename = "K", default)]
+    #[serde(rename = "K", alias = "k", default)]
     k: Vec<f64>,
-    #[serde(rename = "P", default)]
+    #[serde(rename = "P", alias = "p", default)]
     p: Vec<f64>,
 }
 

@@ -36,22 +36,59 @@ pub(crate) enum MessageImage<'a> {
     },
 }
 
+impl MessageImage<'_> {
+    /// True for an image without pixels or bytes, as drivers send it while they start.
+    fn is_empty(&self) -> bool {
+        match self {
+            Self::Raw(image) => image.width == 0 || image.height == 0 || image.data.is_empty(),
+            Self::File { bytes, .. } => bytes.is_empty(),
+        }
+    }
+}
+
+/// Maximum length of a message without an image, in bytes (chosen): a header, names, and fields of base64 or protobuf.
+const MAX_EMPTY_BYTES: usize = 4096;
+
+/// True if the image of a message has no pixels.
+pub(crate) fn is_without_image(schema: &str, encoding: Encoding, bytes: &[u8]) -> bool {
+    bytes.len() <= MAX_EMPTY_BYTES
+        && ImageMessage::parse(schema, encoding, bytes)
+            .is_ok_and(|message| message.image.is_empty())
+}
+
+/// True if a message has an image of an encoding or format that is never read, such as depth. All images of its topic are then alike.
+pub(super) fn has_unread_kind(schema: &str, encoding: Encoding, bytes: &[u8]) -> bool {
+    let Ok(message) = ImageMessage::parse_any(schema, encoding, bytes) else {
+        return false;
+    };
+    !message.image.is_empty()
+        && match &message.image {
+            MessageImage::Raw(image) => !image.encoding.is_empty() && !image.has_known_encoding(),
+            MessageImage::File { format, .. } => check_format(format).is_err(),
+        }
+}
+
 impl<'a> ImageMessage<'a> {
     /// Parses a message of a type with images ([`ChannelContent::Image`](super::ChannelContent)).
     ///
     /// # Errors
     /// If it is not a message of this type, or has depth or a color mosaic in an image file.
     pub(crate) fn parse(schema: &str, encoding: Encoding, bytes: &'a [u8]) -> Result<Self, String> {
-        let message = match encoding {
-            Encoding::Cdr => Self::from_fields(schema, encoding, FieldReader::cdr(bytes)?),
-            Encoding::Ros1 => Self::from_fields(schema, encoding, FieldReader::unaligned(bytes)),
-            Encoding::Protobuf => Self::from_protobuf(schema, bytes),
-            Encoding::Json => Self::from_json(schema, bytes),
-        }?;
+        let message = Self::parse_any(schema, encoding, bytes)?;
         if let MessageImage::File { format, .. } = &message.image {
             check_format(format)?;
         }
         Ok(message)
+    }
+
+    /// Parses a message, also one of a format that is not read.
+    fn parse_any(schema: &str, encoding: Encoding, bytes: &'a [u8]) -> Result<Self, String> {
+        match encoding {
+            Encoding::Cdr => Self::from_fields(schema, encoding, FieldReader::cdr(bytes)?),
+            Encoding::Ros1 => Self::from_fields(schema, encoding, FieldReader::unaligned(bytes)),
+            Encoding::Protobuf => Self::from_protobuf(schema, bytes),
+            Encoding::Json => Self::from_json(schema, bytes),
+        }
     }
 
     fn from_fields(
@@ -146,16 +183,19 @@ impl<'a> ImageMessage<'a> {
     fn from_json(schema: &str, bytes: &[u8]) -> Result<Self, String> {
         let message: JsonImage<'_> =
             serde_json::from_slice(bytes).map_err(|e| format!("not a {schema}: {e}"))?;
-        let data = STANDARD
-            .decode(&*message.data)
-            .map_err(|e| format!("data in base64 expected: {e}"))?;
-        let image = if schema.ends_with("RawImage") {
+        let data = match message.data {
+            JsonData::Text(text) => STANDARD
+                .decode(&*text)
+                .map_err(|e| format!("data in base64 expected: {e}"))?,
+            JsonData::Numbers(numbers) => numbers,
+        };
+        let image = if is_raw(schema) {
             MessageImage::Raw(RawImage {
                 width: message.width,
                 height: message.height,
                 step: message.step,
                 encoding: message.encoding,
-                is_big_endian: false,
+                is_big_endian: message.is_bigendian != 0,
                 data: data.into(),
             })
         } else {
@@ -164,14 +204,23 @@ impl<'a> ImageMessage<'a> {
                 bytes: data.into(),
             }
         };
-        let JsonTime { sec, nsec } = message.timestamp;
+        let JsonHeader {
+            stamp: header_stamp,
+            frame_id: header_frame_id,
+        } = message.header;
+        let JsonTime { sec, nsec } = message.timestamp.unwrap_or(header_stamp);
         let stamp = sec.saturating_mul(1_000_000_000).saturating_add(nsec);
         Ok(Self {
             stamp: (stamp != 0).then_some(stamp),
-            frame_id: message.frame_id,
+            frame_id: message.frame_id.unwrap_or(header_frame_id),
             image,
         })
     }
+}
+
+/// True for types with rows of samples, false for those with image files.
+fn is_raw(schema: &str) -> bool {
+    schema.ends_with("RawImage") || schema == "sensor_msgs/Image"
 }
 
 /// Refuses a format without colour samples: `compressed_image_transport` writes `bayer_rggb8; png compressed ` for a mosaic that it did not
@@ -196,13 +245,13 @@ fn check_format(format: &str) -> Result<(), String> {
     ))
 }
 
-/// A `foxglove.RawImage` or `foxglove.CompressedImage` in JSON.
+/// A message with an image in JSON. Messages of Foxglove have `timestamp` and `frame_id`, those of ROS a `header`.
 #[derive(Deserialize)]
 struct JsonImage<'a> {
+    timestamp: Option<JsonTime>,
+    frame_id: Option<String>,
     #[serde(default)]
-    timestamp: JsonTime,
-    #[serde(default)]
-    frame_id: String,
+    header: JsonHeader,
     #[serde(default)]
     width: usize,
     #[serde(default)]
@@ -213,13 +262,33 @@ struct JsonImage<'a> {
     encoding: String,
     #[serde(default)]
     format: String,
+    #[serde(default)]
+    is_bigendian: u8,
     #[serde(borrow)]
-    data: Cow<'a, str>,
+    data: JsonData<'a>,
+}
+
+/// Bytes in JSON: in base64, or as a list of numbers.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum JsonData<'a> {
+    Text(#[serde(borrow)] Cow<'a, str>),
+    Numbers(Vec<u8>),
+}
+
+#[derive(Default, Deserialize)]
+struct JsonHeader {
+    #[serde(default)]
+    stamp: JsonTime,
+    #[serde(default)]
+    frame_id: String,
 }
 
 #[derive(Default, Deserialize)]
 struct JsonTime {
+    #[serde(alias = "secs")]
     sec: i64,
+    #[serde(alias = "nanosec", alias = "nsecs")]
     nsec: i64,
 }
 

@@ -41,12 +41,6 @@ const CHUNK_HEAD: u64 = 28;
 /// First bytes of a zstd frame (RFC 8878). No CDR message begins with them, because its first byte is 0.
 const ZSTD_MAGIC: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
 
-/// Error message for a bag in SQLite, with the remedy.
-pub(crate) const SQLITE_BAG: &str = "a bag of ROS 2 in SQLite; convert it: rosbags-convert --src FOLDER --dst NEW --dst-storage mcap";
-
-/// Error message for a file that is compressed as a whole, with the remedy.
-pub(crate) const COMPRESSED_FILE: &str = "compressed as a whole; unpack it first: zstd -d FILE";
-
 /// Opcodes of records.
 mod opcode {
     pub(super) const SCHEMA: u8 = 3;
@@ -155,7 +149,10 @@ impl<R: Read + Seek> McapReader<R> {
         }
         let mut magic = [0; MAGIC.len()];
         if file.read_exact(&mut magic).is_err() || magic != MAGIC {
-            return Err(not_mcap(&magic));
+            return Err(
+                "not an MCAP file; a recording of ROS 2 or Foxglove that ends in .mcap expected"
+                    .to_owned(),
+            );
         }
         Ok(Self {
             source: Source::File(file),
@@ -489,19 +486,4 @@ fn ends_too_early() -> String {
 /// Error message for a record that is shorter than its fields.
 fn too_short() -> String {
     "a record is shorter than its fields".to_owned()
-}
-
-/// Error message for a file that is not an MCAP file, from its first bytes.
-fn not_mcap(start: &[u8]) -> String {
-    if start.starts_with(b"#ROSBAG") {
-        return "a bag of ROS 1; `darkqa-eval import rosbag FILE` shows how to convert it"
-            .to_owned();
-    }
-    if start.starts_with(b"SQLite f") {
-        return SQLITE_BAG.to_owned();
-    }
-    if start.starts_with(&ZSTD_MAGIC) {
-        return COMPRESSED_FILE.to_owned();
-    }
-    "not an MCAP file; a recording of ROS 2 or Foxglove that ends in .mcap expected".to_owned()
 }

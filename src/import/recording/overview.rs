@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::io::{Read, Seek};
 
 use super::channel::ChannelContent;
-use super::image_message::{ImageMessage, MessageImage};
+use super::encoding::Encoding;
+use super::image_message::{ImageMessage, MessageImage, has_unread_kind};
 use super::mcap::{Event, MAX_MESSAGE_BYTES, McapReader, Message};
 use super::{Nanoseconds, seconds};
 use crate::types::text::excerpt;
@@ -33,12 +34,122 @@ pub(crate) struct TopicOverview {
     pub(crate) count: usize,
     /// First and last log time of its messages.
     pub(crate) times: [Nanoseconds; 2],
-    /// Size and encoding of the first image, or why it cannot be read; empty for topics without images.
+    /// Size and encoding of the first image that can be read, or why the first message cannot be read; empty for topics without images.
     pub(crate) image_format: String,
+    /// True if no further message needs a look: an image was read, or all images of the topic are of a kind that is not read.
+    is_settled: bool,
+    /// Number of messages before the first image that can be read.
+    pub(crate) broken: usize,
+    /// Why the first of these cannot be read.
+    pub(crate) first_problem: String,
+    /// Serialization of a topic with video.
+    pub(crate) video: Option<Encoding>,
+}
+
+/// Image file of a message.
+pub(crate) enum FileImage {
+    /// One that can be read, with its width and height in pixels.
+    Readable([u32; 2]),
+    /// One that cannot be read, with the reason.
+    Unread(String),
+    /// A part of a video, with a description.
+    Video(String),
 }
 
 impl TopicOverview {
-    /// True if the first message has an image that can be read.
+    /// A topic without messages. `time` is the log time of its first one.
+    fn new(schema: String, time: Nanoseconds) -> Self {
+        Self {
+            schema,
+            count: 0,
+            times: [time; 2],
+            image_format: String::new(),
+            is_settled: false,
+            broken: 0,
+            first_problem: String::new(),
+            video: None,
+        }
+    }
+
+    /// Looks for an image in a message. As the first messages may be broken, each one is tried until the topic is settled.
+    fn look<R: Read + Seek>(
+        &mut self,
+        reader: &mut McapReader<R>,
+        message: &Message,
+        image: impl Fn(&str, &[u8]) -> FileImage,
+    ) {
+        let channel = &message.channel;
+        let found = match &channel.content {
+            ChannelContent::Image(encoding) => self.image_format(reader, message, *encoding, image),
+            ChannelContent::Video(encoding) => {
+                self.is_settled = true;
+                self.video = Some(*encoding);
+                Err("video, not images".to_owned())
+            }
+            ChannelContent::Unsupported(reason) => {
+                self.is_settled = true;
+                Err(reason.clone())
+            }
+            _ => {
+                self.is_settled = true;
+                return;
+            }
+        };
+        match found {
+            Ok(None) => {}
+            Ok(Some(format)) => {
+                self.is_settled = true;
+                self.image_format = excerpt(format.trim(), MAX_FORMAT_LENGTH);
+            }
+            Err(problem) => {
+                if self.broken == 0 {
+                    self.first_problem = excerpt(problem.trim(), MAX_FORMAT_LENGTH);
+                    let format = format!("{UNREAD}{problem}");
+                    self.image_format = excerpt(format.trim(), MAX_FORMAT_LENGTH);
+                }
+                self.broken += 1;
+            }
+        }
+    }
+
+    /// Size and encoding of the image in a message; `None` if the recording is damaged there, which the next event reports.
+    ///
+    /// # Errors
+    /// If it cannot be read.
+    fn image_format<R: Read + Seek>(
+        &mut self,
+        reader: &mut McapReader<R>,
+        message: &Message,
+        encoding: Encoding,
+        image: impl Fn(&str, &[u8]) -> FileImage,
+    ) -> Result<Option<String>, String> {
+        if message.length > MAX_MESSAGE_BYTES {
+            return Err(format!("messages of {} MB", message.length >> 20));
+        }
+        let Some(body) = reader.body() else {
+            return Ok(None);
+        };
+        self.is_settled = has_unread_kind(&message.channel.schema, encoding, body);
+        match ImageMessage::parse(&message.channel.schema, encoding, body)?.image {
+            MessageImage::Raw(image) => {
+                let (width, height) = image.decode()?.size();
+                Ok(Some(format!("{width}×{height} {}", image.encoding)))
+            }
+            MessageImage::File { format, bytes } => match image(&format, &bytes) {
+                FileImage::Readable([width, height]) => {
+                    Ok(Some(format!("{width}×{height} {format}")))
+                }
+                FileImage::Unread(problem) => Err(problem),
+                FileImage::Video(problem) => {
+                    self.is_settled = true;
+                    self.video = Some(encoding);
+                    Err(problem)
+                }
+            },
+        }
+    }
+
+    /// True if a message has an image that can be read.
     pub(crate) fn has_images(&self) -> bool {
         !self.image_format.is_empty() && !self.image_format.starts_with(UNREAD)
     }
@@ -56,22 +167,20 @@ impl TopicOverview {
 }
 
 impl Overview {
-    /// Adds the messages of a file called `place`. `size` reads the width and height of an image file.
+    /// Adds the messages of a file called `place`. `image` reads an image file, from the format that its message states and its bytes.
     pub(crate) fn add<R: Read + Seek>(
         &mut self,
         place: &str,
         mut reader: McapReader<R>,
-        size: impl Fn(&[u8]) -> Result<(u32, u32), String>,
+        image: impl Fn(&str, &[u8]) -> FileImage,
     ) {
         while let Some(event) = reader.next() {
             match event {
                 Event::Message(message) => {
-                    let is_first = self.count(&message);
-                    if is_first
-                        && let Some(format) = image_format(&mut reader, &message, &size)
-                        && let Some(topic) = self.topics.get_mut(&message.channel.topic)
+                    if let Some(topic) = self.count(&message)
+                        && !topic.is_settled
                     {
-                        topic.image_format = format;
+                        topic.look(&mut reader, &message, &image);
                     }
                 }
                 Event::ChunkRead => {}
@@ -106,24 +215,19 @@ impl Overview {
             })
     }
 
-    /// Counts a message. Returns true if it is the first of its topic.
-    fn count(&mut self, message: &Message) -> bool {
+    /// Counts a message, and returns its topic.
+    fn count(&mut self, message: &Message) -> Option<&mut TopicOverview> {
         let channel = &message.channel;
         let time = message.log_time;
         self.start.get_or_insert(time);
-        if let Some(topic) = self.topics.get_mut(&channel.topic) {
-            topic.count += 1;
-            topic.times = [topic.times[0].min(time), topic.times[1].max(time)];
-            return false;
+        if !self.topics.contains_key(&channel.topic) {
+            let topic = TopicOverview::new(channel.schema.clone(), time);
+            self.topics.insert(channel.topic.clone(), topic);
         }
-        let topic = TopicOverview {
-            schema: channel.schema.clone(),
-            count: 1,
-            times: [time; 2],
-            image_format: String::new(),
-        };
-        self.topics.insert(channel.topic.clone(), topic);
-        true
+        let topic = self.topics.get_mut(&channel.topic)?;
+        topic.count += 1;
+        topic.times = [topic.times[0].min(time), topic.times[1].max(time)];
+        Some(topic)
     }
 
     /// Names of the topics with images.
@@ -134,34 +238,4 @@ impl Overview {
             .map(|(name, _)| &**name)
             .collect()
     }
-}
-
-/// Size and encoding of the image in a message, or why it cannot be read; `None` for other messages.
-fn image_format<R: Read + Seek>(
-    reader: &mut McapReader<R>,
-    message: &Message,
-    size: impl Fn(&[u8]) -> Result<(u32, u32), String>,
-) -> Option<String> {
-    let channel = &message.channel;
-    let encoding = match &channel.content {
-        ChannelContent::Image(encoding) => *encoding,
-        ChannelContent::Unsupported(reason) => return Some(format!("{UNREAD}{reason}")),
-        _ => return None,
-    };
-    if message.length > MAX_MESSAGE_BYTES {
-        return Some(format!("{UNREAD}messages of {} MB", message.length >> 20));
-    }
-    let format = ImageMessage::parse(&channel.schema, encoding, reader.body()?)
-        .and_then(|message| match message.image {
-            MessageImage::Raw(image) => {
-                let (width, height) = image.decode()?.size();
-                Ok(format!("{width}×{height} {}", image.encoding))
-            }
-            MessageImage::File { format, bytes } => {
-                let (width, height) = size(&bytes)?;
-                Ok(format!("{width}×{height} {format}"))
-            }
-        })
-        .unwrap_or_else(|problem| format!("{UNREAD}{problem}"));
-    Some(excerpt(format.trim(), MAX_FORMAT_LENGTH))
 }

@@ -66,10 +66,8 @@ impl SamplingArgs {
         Sampler {
             interval: nanoseconds(self.interval().max(spread)),
             at,
-            passed: 0,
             limit: self.max_frames.map_or(usize::MAX, NonZeroUsize::get),
-            taken: 0,
-            next: 0,
+            progress: SamplerProgress::default(),
             min_change: self.changed,
             last_taken: None,
         }
@@ -108,38 +106,54 @@ pub(crate) struct Sampler {
     interval: Nanoseconds,
     /// Times to sample since the first frame, sorted; empty if the interval decides.
     at: Vec<Nanoseconds>,
-    /// Number of these times that are in the past.
-    passed: usize,
     /// Maximum number of frames.
     limit: usize,
-    /// Number of chosen frames.
-    taken: usize,
-    /// Time since the first frame of the drive when the next frame is due.
-    next: Nanoseconds,
+    progress: SamplerProgress,
     /// Minimum difference from the last chosen frame, in 8-bit codes; `None` if pixels do not matter.
     min_change: Option<f64>,
     last_taken: Option<Thumbnail>,
 }
 
+/// Progress of a sampler.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct SamplerProgress {
+    /// Number of times given with `--at` that are in the past.
+    passed: usize,
+    /// Number of chosen frames.
+    taken: usize,
+    /// Time since the first frame of the drive when the next frame is due.
+    next: Nanoseconds,
+}
+
 impl Sampler {
+    /// The progress so far.
+    pub(crate) fn progress(&self) -> SamplerProgress {
+        self.progress
+    }
+
+    /// Returns to an earlier progress, so that the next frame takes the place of one that is broken.
+    pub(crate) fn reset(&mut self, progress: SamplerProgress) {
+        self.progress = progress;
+    }
+
     /// Chooses a frame by its time. If [`Self::compares_pixels`], [`Self::has_changed`] decides about a due frame.
     pub(crate) fn is_due(&mut self, place: Place) -> bool {
         let since = place.since;
-        if self.taken >= self.limit {
+        if self.progress.taken >= self.limit {
             return false;
         }
         if !self.at.is_empty() {
             let passed = self.at.partition_point(|time| *time <= since);
-            let is_due = passed > self.passed;
-            self.passed = self.passed.max(passed);
-            self.taken += usize::from(is_due);
+            let is_due = passed > self.progress.passed;
+            self.progress.passed = self.progress.passed.max(passed);
+            self.progress.taken += usize::from(is_due);
             return is_due;
         }
-        let is_due = self.interval == 0 || since >= self.next;
+        let is_due = self.interval == 0 || since >= self.progress.next;
         if is_due && self.interval > 0 {
-            self.next = (since / self.interval + 1).saturating_mul(self.interval);
+            self.progress.next = (since / self.interval + 1).saturating_mul(self.interval);
         }
-        self.taken += usize::from(is_due);
+        self.progress.taken += usize::from(is_due);
         is_due
     }
 
@@ -158,7 +172,7 @@ impl Sampler {
         if has_changed {
             self.last_taken = Some(thumbnail);
         } else {
-            self.taken -= 1;
+            self.progress.taken -= 1;
         }
         has_changed
     }
@@ -167,7 +181,7 @@ impl Sampler {
     pub(crate) fn missed(&self) -> Vec<f64> {
         self.at
             .iter()
-            .skip(self.passed)
+            .skip(self.progress.passed)
             .map(|time| seconds(*time))
             .collect()
     }
@@ -201,6 +215,26 @@ mod tests {
             ..SamplingArgs::default()
         };
         assert_eq!(chosen(&every, &times).len(), times.len());
+    }
+
+    #[test]
+    fn broken_frame_gives_its_place_to_the_next() {
+        let args = SamplingArgs {
+            max_frames: NonZeroUsize::new(1),
+            ..SamplingArgs::default()
+        };
+        let mut sampler = args.sampler(10.0);
+        let place = |since| Place {
+            time: since,
+            since,
+            stretch: 0,
+        };
+        let before = sampler.progress();
+        assert!(sampler.is_due(place(0)));
+        sampler.reset(before);
+        assert!(sampler.is_due(place(1)));
+        // Control: without a reset, no further frame is due.
+        assert!(!sampler.is_due(place(2)));
     }
 
     #[test]

@@ -60,7 +60,9 @@ fn read(file: &[u8]) -> ReadBack {
                         drop(CameraInfo::parse(schema, *encoding, body));
                     }
                     ChannelContent::Exposure(fields) => drop(fields.parse(body)),
-                    ChannelContent::Unsupported(_) | ChannelContent::Other => {}
+                    ChannelContent::Unsupported(_)
+                    | ChannelContent::Video(_)
+                    | ChannelContent::Other => {}
                 }
             }
             Event::Message(_) => {}

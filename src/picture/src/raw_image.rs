@@ -2,6 +2,7 @@
 
 mod layout;
 mod mosaic;
+mod yuv;
 
 use std::borrow::Cow;
 
@@ -10,6 +11,7 @@ use darkqa_ground::types::{Image, Rgb, Rgb16Image};
 
 use self::layout::{Depth, Layout, Order};
 use self::mosaic::{RawSample, demosaic};
+use self::yuv::YuvLayout;
 use super::decode_rule::MAX_PIXELS;
 use super::encoding::{png, png_16};
 
@@ -82,14 +84,39 @@ impl RawPixels {
     }
 }
 
+/// True for the name of an encoding in YUV, such as `yuv422_yuy2` or `nv12`. Messages do not state its matrix and range.
+pub fn is_yuv(encoding: &str) -> bool {
+    YuvLayout::from_encoding(encoding).is_some()
+}
+
 impl RawImage<'_> {
-    /// Converts the image to RGB: grey becomes three equal channels, alpha is dropped, and a mosaic is interpolated bilinearly.
+    /// True if images of this encoding can be decoded.
+    pub fn has_known_encoding(&self) -> bool {
+        self.is_yuv() || Layout::from_encoding(&self.encoding).is_ok()
+    }
+
+    /// True for an image in YUV.
+    pub fn is_yuv(&self) -> bool {
+        is_yuv(&self.encoding)
+    }
+
+    /// Converts the image to RGB: grey becomes three equal channels, alpha is dropped, a mosaic is interpolated bilinearly, and YUV is
+    /// converted by the matrix of BT.601 for the limited range.
     ///
     /// # Errors
     /// If the encoding is unknown, or the data are shorter than the size requires.
     pub fn decode(&self) -> Result<RawPixels, String> {
+        if let Some(layout) = YuvLayout::from_encoding(&self.encoding) {
+            self.check_size()?;
+            let samples = layout
+                .decode([self.width, self.height], self.step, &self.data)
+                .map_err(|problem| format!("{}: {problem}", self.encoding))?;
+            let image = Image::new(self.height, self.width, samples);
+            return image.map(RawPixels::Codes8).map_err(|e| e.to_string());
+        }
         let layout = Layout::from_encoding(&self.encoding)?;
-        let rows = self.rows(layout)?;
+        self.check_size()?;
+        let rows = self.rows_of(self.width * layout.channels * layout.depth.bytes())?;
         let pixels = match layout.depth {
             Depth::Eight => RawPixels::Codes8(self.image(layout, rows, |row, samples| {
                 samples.extend_from_slice(row);
@@ -106,8 +133,20 @@ impl RawImage<'_> {
         Ok(pixels)
     }
 
-    /// The rows without their padding.
-    fn rows(&self, layout: Layout) -> Result<impl Iterator<Item = &[u8]>, String> {
+    /// Refuses an image without pixels or with too many.
+    fn check_size(&self) -> Result<(), String> {
+        let (width, height) = (self.width, self.height);
+        let pixels = (width as u64).saturating_mul(height as u64);
+        if pixels == 0 || pixels > MAX_PIXELS {
+            return Err(format!(
+                "{width} × {height} pixels; 1 to {MAX_PIXELS} pixels expected"
+            ));
+        }
+        Ok(())
+    }
+
+    /// The rows without their padding. `row` is the length of a row in bytes.
+    fn rows_of(&self, row: usize) -> Result<impl Iterator<Item = &[u8]>, String> {
         let Self {
             width,
             height,
@@ -115,13 +154,6 @@ impl RawImage<'_> {
             ref data,
             ..
         } = *self;
-        let pixels = (width as u64).saturating_mul(height as u64);
-        if pixels == 0 || pixels > MAX_PIXELS {
-            return Err(format!(
-                "{width} × {height} pixels; 1 to {MAX_PIXELS} pixels expected"
-            ));
-        }
-        let row = width * layout.channels * layout.depth.bytes();
         if step < row {
             return Err(format!(
                 "rows of {step} bytes; {width} pixels of {} need {row}",
@@ -251,7 +283,7 @@ mod tests {
             ("rgb8", [usize::MAX, 2], usize::MAX, 9, "pixels; 1 to"),
             ("rgb8", [1, 9], usize::MAX, 9, "9 bytes; 9 rows"),
             ("16UC1", [1, 1], 2, 2, "depth"),
-            ("nv12", [1, 1], 2, 2, "unknown encoding"),
+            ("yuv420p", [1, 1], 2, 2, "unknown encoding"),
         ] {
             let data = vec![0; bytes];
             let problem = image(encoding, size, step, &data).decode().unwrap_err();

@@ -4,7 +4,7 @@ use std::collections::{BTreeSet, HashMap, VecDeque};
 
 use serde_json::{Map, Value};
 
-use crate::import::recording::{CameraInfo, Exposure, Nanoseconds};
+use crate::import::recording::{CameraInfo, Exposure, Nanoseconds, intrinsics_names};
 use crate::types::Intrinsics;
 
 /// Maximum number of exposures kept until their image arrives (chosen); drivers send both within a few frames.
@@ -23,18 +23,20 @@ impl Cameras {
         }
     }
 
-    /// The intrinsics at a time: the last ones before it, or else the first.
+    /// The intrinsics of an image topic at a time: the last ones before it, or else the first. Of several cameras whose names match the topic,
+    /// the first one with intrinsics for this size is used.
     pub(super) fn intrinsics(
         &self,
-        camera: &str,
         topic: &str,
         time: Nanoseconds,
         size: (usize, usize),
     ) -> Option<Intrinsics> {
-        let infos = self.0.get(camera)?;
-        let after = infos.partition_point(|(from, _)| *from <= time);
-        let (_, info) = &infos[after.saturating_sub(1)];
-        info.intrinsics_for(topic, size)
+        intrinsics_names(topic).into_iter().find_map(|camera| {
+            let infos = self.0.get(camera)?;
+            let after = infos.partition_point(|(from, _)| *from <= time);
+            let (_, info) = &infos[after.saturating_sub(1)];
+            info.intrinsics_for(topic, size)
+        })
     }
 }
 

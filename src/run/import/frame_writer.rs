@@ -12,11 +12,12 @@ use crate::dataset::frame_folder::{self, FrameOutput};
 use crate::error::{Error, Result};
 use crate::images::frames::InputTally;
 use crate::import::recording::{
-    Channel, ChannelContent, ImageMessage, MessageImage, Nanoseconds, Place, Thumbnail, seconds,
+    Channel, ChannelContent, ForeignData, ImageMessage, MessageImage, Nanoseconds, Place,
+    Thumbnail, seconds,
 };
 use crate::picture::ImageFile;
 use crate::picture::decode_rule::DecodeRule;
-use crate::picture::raw_image::RawPixels;
+use crate::picture::raw_image::{RawPixels, is_yuv};
 use crate::types::text::counted;
 use crate::types::text::excerpt;
 use crate::types::{DepthNote, FrameId, Labels, Pixels, Rgb, Rgb16Image};
@@ -39,6 +40,8 @@ pub(super) struct ChosenFrame {
     /// Name of the frame in its scene.
     pub(super) name: String,
     pub(super) place: Place,
+    /// Time stamp.
+    pub(super) time: Nanoseconds,
     pub(super) log_time: Nanoseconds,
     /// Further facts for its line in `frames.jsonl`.
     pub(super) facts: Map<String, Value>,
@@ -83,6 +86,10 @@ pub(super) struct WrittenFrame {
     pub(super) is_turned: bool,
     /// Largest sample, for 16-bit images.
     peak_16: Option<u16>,
+    /// True for images in YUV.
+    is_yuv: bool,
+    /// True if the message's format states that a colour image was compressed as grey.
+    has_lost_colour: bool,
     /// Line in `frames.jsonl`.
     pub(super) line: Map<String, Value>,
 }
@@ -94,6 +101,8 @@ struct EncodedFrame {
     size: (usize, usize),
     is_turned: bool,
     peak_16: Option<u16>,
+    is_yuv: bool,
+    has_lost_colour: bool,
     frame_id: String,
 }
 
@@ -200,6 +209,8 @@ impl<'a> FrameWriter<'a> {
                 size: (image.width(), image.height()),
                 is_turned: false,
                 peak_16: None,
+                is_yuv: false,
+                has_lost_colour: false,
                 frame_id: String::new(),
             },
         };
@@ -215,7 +226,7 @@ impl<'a> FrameWriter<'a> {
             .write("rgb", encoded.ending, &encoded.bytes)
             .map_err(|e| e.to_string())?;
         line.insert("rgb".to_owned(), json!(path));
-        line.insert("t".to_owned(), json!(seconds(frame.place.time)));
+        line.insert("t".to_owned(), json!(seconds(frame.time)));
         line.insert("topic".to_owned(), json!(frame.topic));
         if !encoded.frame_id.is_empty() {
             line.insert("frame_id".to_owned(), json!(encoded.frame_id));
@@ -223,11 +234,13 @@ impl<'a> FrameWriter<'a> {
         line.extend(frame.facts.clone());
         Ok(WrittenFrame {
             topic: frame.topic.clone(),
-            time: frame.place.time,
+            time: frame.time,
             log_time: frame.log_time,
             size: encoded.size,
             is_turned: encoded.is_turned,
             peak_16: encoded.peak_16,
+            is_yuv: encoded.is_yuv,
+            has_lost_colour: encoded.has_lost_colour,
             line,
         })
     }
@@ -250,6 +263,8 @@ impl<'a> FrameWriter<'a> {
                     size: pixels.size(),
                     is_turned: false,
                     peak_16,
+                    is_yuv: image.is_yuv(),
+                    has_lost_colour: false,
                     frame_id: message.frame_id,
                 })
             }
@@ -270,10 +285,12 @@ impl<'a> FrameWriter<'a> {
         let file = ImageFile::new(bytes, frame.words(), DecodeRule::default());
         let ending = file.extension();
         if !COPIED.contains(&ending) {
-            return Err(format!(
-                "format {:?}; a JPEG, PNG or WebP file expected",
-                excerpt(format, 60)
-            ));
+            let kind = ForeignData::detect(format, file.bytes(), ending);
+            let remedy = match kind {
+                ForeignData::Video(_) => VIDEO_REMEDY,
+                _ => "",
+            };
+            return Err(format!("{}{remedy}", kind.words(format)));
         }
         let note = file.note();
         let is_turned = note.orientation.is_some();
@@ -306,6 +323,8 @@ impl<'a> FrameWriter<'a> {
                 size,
                 is_turned,
                 peak_16,
+                is_yuv: false,
+                has_lost_colour: false,
                 frame_id: String::new(),
             });
         }
@@ -315,6 +334,8 @@ impl<'a> FrameWriter<'a> {
             size: (width as usize, height as usize),
             is_turned,
             peak_16: None,
+            is_yuv: false,
+            has_lost_colour: has_lost_colour(format),
             ending,
             bytes: file.bytes().to_vec(),
             frame_id: String::new(),
@@ -332,6 +353,7 @@ impl<'a> FrameWriter<'a> {
         }
         std::mem::take(&mut self.tally).warn();
         self.warn_of_white();
+        self.warn_of_lost_colour();
         self.written.sort_by_cached_key(|written| {
             ["scene", "frame"].map(|key| written.line[key].as_str().map(str::to_owned))
         });
@@ -344,6 +366,49 @@ impl<'a> FrameWriter<'a> {
             .collect();
         scenes.dedup();
         Ok(scenes.len())
+    }
+
+    /// Gives the frames of a topic the times of the recorder.
+    pub(super) fn use_log_times(&mut self, topic: &str) {
+        for written in self
+            .written
+            .iter_mut()
+            .filter(|written| written.topic == topic)
+        {
+            let time = json!(seconds(written.log_time));
+            written.line.insert("t".to_owned(), time);
+        }
+    }
+
+    /// The line about images in YUV; empty without any.
+    pub(super) fn conversion_note(&self) -> String {
+        match self.written.iter().filter(|written| written.is_yuv).count() {
+            0 => String::new(),
+            count => format!(
+                "YUV, converted to RGB by BT.601 in limited range, as cv_bridge does (the messages state no matrix): {}\n",
+                counted(count, "frame")
+            ),
+        }
+    }
+
+    /// Warns of topics with colour images that were compressed as grey.
+    fn warn_of_lost_colour(&self) {
+        let mut topics: BTreeMap<&str, usize> = BTreeMap::new();
+        for written in self
+            .written
+            .iter()
+            .filter(|written| written.has_lost_colour)
+        {
+            *topics.entry(&written.topic).or_default() += 1;
+        }
+        for (topic, count) in topics {
+            let camera = topic.rsplit_once('/').map_or(topic, |(camera, _)| camera);
+            tracing::warn!(
+                "{}: {topic}: {} grey, although the camera has colour: the compression dropped it; record {camera} for questions about colours",
+                self.drive,
+                counted(count, "image")
+            );
+        }
     }
 
     /// Warns if 16-bit images seem to use fewer bits, which makes them too dark.
@@ -379,6 +444,22 @@ fn problem(error: Error) -> String {
         Error::Data { problem, .. } => problem,
         other => other.to_string(),
     }
+}
+
+/// Remedy for a topic with video, to continue its description.
+pub(super) const VIDEO_REMEDY: &str =
+    "; `darkqa-eval import mcap` without --out prints the commands that make a video file of it";
+
+/// True if a format states that a colour image was compressed as grey: `compressed_image_transport` writes `yuv422_yuy2; jpeg compressed mono8`
+/// for an image in YUV.
+fn has_lost_colour(format: &str) -> bool {
+    let (source, target) = format.split_once(';').unwrap_or((format, ""));
+    let source = source.trim();
+    let is_colour = is_yuv(source)
+        || ["rgb", "bgr", "8UC3", "8UC4", "16UC3", "16UC4"]
+            .iter()
+            .any(|start| source.starts_with(start));
+    is_colour && target.contains("mono")
 }
 
 /// The thumbnail of a message's image.

@@ -9,7 +9,8 @@ use serde_json::{Value, json};
 
 use super::frame_writer::summary;
 use super::lerobot_frames::EpisodeImport;
-use super::recording::{check_output, slug};
+use super::mcap_files::slug;
+use super::recording::check_output;
 use crate::dataset::RootArgs;
 use crate::error::{Error, Result};
 use crate::images::progress::Progress;

@@ -7,7 +7,7 @@ use std::path::Path;
 use serde_json::{Map, Value, json};
 
 use super::frame_writer::{ChosenFrame, FrameSource, FrameWriter};
-use super::recording::slug;
+use super::mcap_files::slug;
 use crate::dataset::ParquetColumns;
 use crate::error::{Error, Result};
 use crate::images::progress::{Progress, StepBar};

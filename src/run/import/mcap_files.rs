@@ -3,12 +3,13 @@
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
+use super::conversion::conversion;
 use super::frame_writer::COPIED;
 use crate::dataset::Root;
 use crate::error::{Error, Result};
-use crate::files::reading::{entries, open};
+use crate::files::reading::open;
 use crate::images::progress::Progress;
-use crate::import::recording::{COMPRESSED_FILE, McapReader, Overview, SQLITE_BAG};
+use crate::import::recording::{FileImage, ForeignData, McapReader, Overview};
 use crate::picture::ImageFile;
 use crate::picture::decode_rule::DecodeRule;
 
@@ -29,7 +30,9 @@ pub(super) fn files(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
         }
         inside.retain(is_mcap);
         if inside.is_empty() {
-            return Err(Error::data(path.display(), no_mcap_problem(path)?));
+            let problem = conversion(path);
+            let problem = problem.unwrap_or_else(|| "no .mcap file in this folder".to_owned());
+            return Err(Error::data(path.display(), problem));
         }
         inside.sort_by_cached_key(|file| {
             let stem = file
@@ -48,22 +51,34 @@ pub(super) fn files(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// The message for a folder without MCAP files.
-fn no_mcap_problem(folder: &Path) -> Result<&'static str> {
-    let files = entries(folder)?;
-    Ok(if has_ending(&files, "db3") {
-        SQLITE_BAG
-    } else if has_ending(&files, "zstd") || has_ending(&files, "zst") {
-        COMPRESSED_FILE
-    } else {
-        "no .mcap file in this folder"
-    })
+/// A topic as part of a file name.
+pub(super) fn slug(topic: &str) -> String {
+    let name: String = topic
+        .chars()
+        .map(|c| {
+            if c.is_alphanumeric() || matches!(c, '-' | '.') {
+                c
+            } else {
+                '_'
+            }
+        })
+        .collect();
+    name.trim_matches(['_', '.']).to_owned()
 }
 
-fn has_ending(files: &[PathBuf], ending: &str) -> bool {
-    files
-        .iter()
-        .any(|file| file.extension().is_some_and(|own| own == ending))
+/// The name of a drive: the stem of its first file, without the number that bags append.
+pub(super) fn drive_name(file: &Path) -> String {
+    let stem = file
+        .file_stem()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .into_owned();
+    let name = slug(stem.strip_suffix("_0").unwrap_or(&stem));
+    if name.is_empty() {
+        "drive".to_owned()
+    } else {
+        name
+    }
 }
 
 /// Total size of files, in bytes.
@@ -77,7 +92,10 @@ pub(super) fn total_bytes(files: &[PathBuf]) -> u64 {
 
 pub(super) fn open_reader(path: &Path) -> Result<McapReader<File>> {
     let file = open(path).map_err(|e| Error::file(path, "read", e))?;
-    McapReader::open(file).map_err(|problem| Error::data(path.display(), problem))
+    McapReader::open(file).map_err(|problem| {
+        let problem = conversion(path).unwrap_or(problem);
+        Error::data(path.display(), problem)
+    })
 }
 
 /// The topics of all files.
@@ -94,18 +112,27 @@ pub(super) fn overview(files: &[PathBuf], progress: &Progress) -> Result<Overvie
                 continue;
             }
         };
-        overview.add(&file.display().to_string(), reader, image_size);
+        overview.add(&file.display().to_string(), reader, file_image);
     }
     Ok(overview)
 }
 
-/// Width and height of an image file in a message.
-fn image_size(bytes: &[u8]) -> Result<(u32, u32), String> {
-    let name = "the first image".to_owned();
+/// The image file in a message with this format.
+fn file_image(format: &str, bytes: &[u8]) -> FileImage {
+    let name = "an image".to_owned();
     let file = ImageFile::new(bytes.to_vec(), name, DecodeRule::default());
     let ending = file.extension();
     if !COPIED.contains(&ending) {
-        return Err(format!("a file .{ending}; JPEG, PNG or WebP expected"));
+        let kind = ForeignData::detect(format, bytes, ending);
+        let words = kind.words(format);
+        return match kind {
+            ForeignData::Video(_) => FileImage::Video(words),
+            _ => FileImage::Unread(words),
+        };
     }
-    file.check().map_err(|e| e.to_string())
+    match file.check() {
+        Ok((width, height)) => FileImage::Readable([width, height]),
+        Err(Error::Data { problem, .. }) => FileImage::Unread(problem),
+        Err(other) => FileImage::Unread(other.to_string()),
+    }
 }

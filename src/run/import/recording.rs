@@ -11,16 +11,19 @@ use clap::Args;
 use serde_json::{Map, Value, json};
 
 use super::camera_facts::{Cameras, Exposures};
-use super::frame_writer::{ChosenFrame, FrameSource, FrameWriter, summary, thumbnail};
-use super::mcap_files::{files, open_reader, overview, total_bytes};
-use super::topic_list::{MAX_NAMED, listing, no_images};
+use super::frame_writer::{
+    ChosenFrame, FrameSource, FrameWriter, VIDEO_REMEDY, summary, thumbnail,
+};
+use super::mcap_files::{drive_name, files, open_reader, overview, slug, total_bytes};
+use super::message_times::MessageTimes;
+use super::topic_list::{MAX_NAMED, listing, no_images, warn_of_unread};
 use crate::error::{Error, Result};
 use crate::images::progress::{Progress, StepBar};
 use crate::images::workers::{ThreadArgs, pool};
 use crate::import::recording::{
     CameraInfo, ChannelContent, Encoding, Event, ImageMessage, MAX_MESSAGE_BYTES, McapReader,
     Message, Nanoseconds, Overview, Sampler, SamplingArgs, Stretches, TopicClock, TopicOverview,
-    camera_name, seconds, stamp,
+    camera_name, camera_of_info, is_without_image, seconds, stamp,
 };
 use crate::runs::Outcome;
 use crate::text::words::first_names;
@@ -131,9 +134,9 @@ pub(crate) fn import(args: &McapArgs, progress: &Progress) -> Result<Outcome> {
         .then(|| overview(&files, progress))
         .transpose()?;
     let Some(out) = &args.out else {
-        return listing(&files[0], &overview.unwrap_or_default());
+        return listing(&files, &overview.unwrap_or_default());
     };
-    let topics = selected_topics(args, &files[0], overview.as_ref())?;
+    let topics = selected_topics(args, &files, overview.as_ref())?;
     let drive = drive_name(&files[0]);
     let mut import = Import::new(args, out, &drive, &topics, overview.as_ref())?;
     let mut problems = Vec::new();
@@ -153,12 +156,14 @@ pub(crate) fn import(args: &McapArgs, progress: &Progress) -> Result<Outcome> {
 /// The topics to import: the named ones, or the only one with images.
 fn selected_topics(
     args: &McapArgs,
-    file: &Path,
+    files: &[PathBuf],
     overview: Option<&Overview>,
 ) -> Result<BTreeSet<String>> {
     let known = overview.map(Overview::image_topics);
     let topics = match (known, overview) {
-        (Some(known), Some(overview)) if known.is_empty() => return Err(no_images(file, overview)),
+        (Some(known), Some(overview)) if known.is_empty() => {
+            return Err(no_images(files, overview));
+        }
         (Some(known), _) if args.topic.is_empty() && known.len() > 1 => {
             let problem = format_args!(
                 "several topics have images; choose one or more of {}",
@@ -166,7 +171,10 @@ fn selected_topics(
             );
             return Err(Error::usage("--topic", problem));
         }
-        (Some(known), _) if args.topic.is_empty() => BTreeSet::from([known[0].to_owned()]),
+        (Some(known), Some(overview)) if args.topic.is_empty() => {
+            warn_of_unread(known[0], overview);
+            BTreeSet::from([known[0].to_owned()])
+        }
         _ => args.topic.iter().cloned().collect(),
     };
     let slugs: BTreeSet<String> = topics.iter().map(|topic: &String| slug(topic)).collect();
@@ -178,36 +186,6 @@ fn selected_topics(
     Ok(topics)
 }
 
-/// A topic as part of a file name.
-pub(super) fn slug(topic: &str) -> String {
-    let name: String = topic
-        .chars()
-        .map(|c| {
-            if c.is_alphanumeric() || matches!(c, '-' | '.') {
-                c
-            } else {
-                '_'
-            }
-        })
-        .collect();
-    name.trim_matches(['_', '.']).to_owned()
-}
-
-/// The name of a drive: the stem of its first file, without the number that bags append.
-pub(super) fn drive_name(file: &Path) -> String {
-    let stem = file
-        .file_stem()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .into_owned();
-    let name = slug(stem.strip_suffix("_0").unwrap_or(&stem));
-    if name.is_empty() {
-        "drive".to_owned()
-    } else {
-        name
-    }
-}
-
 /// A topic whose images are imported.
 struct SelectedTopic {
     sampler: Sampler,
@@ -215,6 +193,7 @@ struct SelectedTopic {
     prefix: String,
     /// Number of messages so far.
     seen: usize,
+    times: MessageTimes,
     clock: TopicClock,
     /// Time of the last frame.
     latest: Option<Nanoseconds>,
@@ -262,6 +241,7 @@ impl<'a> Import<'a> {
                             String::new()
                         },
                         seen: 0,
+                        times: MessageTimes::default(),
                         clock: TopicClock::default(),
                         latest: None,
                     };
@@ -355,6 +335,9 @@ impl<'a> Import<'a> {
             topic.seen += 1;
             let problem = match &channel.content {
                 ChannelContent::Unsupported(reason) => format!("{}: {reason}", channel.topic),
+                ChannelContent::Video(_) => {
+                    format!("{}: video, not images{VIDEO_REMEDY}", channel.topic)
+                }
                 _ => format!(
                     "{}: messages of {} are no images",
                     channel.topic, channel.schema
@@ -368,7 +351,7 @@ impl<'a> Import<'a> {
                     && let Ok(info) = CameraInfo::parse(&channel.schema, *encoding, bytes)
                 {
                     self.cameras
-                        .add(camera_name(&channel.topic), message.log_time, info);
+                        .add(camera_of_info(&channel.topic), message.log_time, info);
                 }
             }
             ChannelContent::Exposure(fields) if message.length <= MAX_MESSAGE_BYTES => {
@@ -385,6 +368,18 @@ impl<'a> Import<'a> {
         }
     }
 
+    /// Counts a message that is too long to be read.
+    fn fail_oversized(&mut self, message: &Message) {
+        let topic = &message.channel.topic;
+        let since = self.since_start(message.log_time);
+        let problem = format!(
+            "{topic} at {since:.3} s: a message of {} MB; {} MB at most are read",
+            message.length >> 20,
+            MAX_MESSAGE_BYTES >> 20
+        );
+        self.writer.fail(topic, &problem);
+    }
+
     /// Gives the image of a message to the writer, if its topic's sampler selects it.
     fn process_image(
         &mut self,
@@ -395,13 +390,7 @@ impl<'a> Import<'a> {
         let topic = message.channel.topic.clone();
         let schema = &message.channel.schema;
         if message.length > MAX_MESSAGE_BYTES {
-            let since = self.since_start(message.log_time);
-            let problem = format!(
-                "{topic} at {since:.3} s: a message of {} MB; {} MB at most are read",
-                message.length >> 20,
-                MAX_MESSAGE_BYTES >> 20
-            );
-            self.writer.fail(&topic, &problem);
+            self.fail_oversized(message);
             return;
         }
         // If the body is cut off, the next event reports it.
@@ -418,9 +407,10 @@ impl<'a> Import<'a> {
         let Some(selected) = self.topics.get_mut(&topic) else {
             return;
         };
+        let sampled = selected.times.next(stated, message.log_time);
         let place = self
             .stretches
-            .place(&mut selected.clock, time, message.log_time);
+            .place(&mut selected.clock, sampled, message.log_time);
         if let Some(latest) = selected
             .latest
             .replace(time)
@@ -435,10 +425,14 @@ impl<'a> Import<'a> {
         }
         let number = selected.seen;
         selected.seen += 1;
+        let before = selected.sampler.progress();
         if !selected.sampler.is_due(place) || reader.body().is_none() {
             return;
         }
         let bytes = reader.take_body();
+        if is_without_image(schema, encoding, &bytes) {
+            selected.sampler.reset(before);
+        }
         if selected.sampler.compares_pixels() {
             // An image that cannot be decoded goes to the writer, which counts the problem.
             if let Ok(thumbnail) = thumbnail(&message.channel, &bytes, self.white)
@@ -453,6 +447,7 @@ impl<'a> Import<'a> {
             topic,
             name,
             place,
+            time,
             log_time: message.log_time,
             facts: Map::new(),
             source: FrameSource::Message {
@@ -501,7 +496,7 @@ impl<'a> Import<'a> {
             let camera = camera_name(&written.topic);
             let intrinsics =
                 self.cameras
-                    .intrinsics(camera, &written.topic, written.log_time, written.size);
+                    .intrinsics(&written.topic, written.log_time, written.size);
             if let Some(intrinsics) = intrinsics.filter(|_| !written.is_turned) {
                 written
                     .line
@@ -514,6 +509,20 @@ impl<'a> Import<'a> {
             }
         }
         [with_intrinsics, with_exposure]
+    }
+
+    /// Gives the frames of topics with one time stamp the times of the recorder, with a warning.
+    fn replace_constant_times(&mut self) {
+        for (topic, selected) in &self.topics {
+            if !selected.times.is_constant() {
+                continue;
+            }
+            tracing::warn!(
+                "{topic}: all {} with the same time stamp; the times of the recorder are used",
+                counted(selected.seen, "message")
+            );
+            self.writer.use_log_times(topic);
+        }
     }
 
     /// Writes the files about all frames, with `info` in `dataset.json`, and returns the result of the import.
@@ -532,6 +541,7 @@ impl<'a> Import<'a> {
         }
         self.writer.write_waiting();
         let [with_intrinsics, with_exposure] = self.add_camera_facts();
+        self.replace_constant_times();
         let names: Vec<String> = self.topics.keys().cloned().collect();
         info["topics"] = json!(names);
         let scenes = self.writer.finish(&place, &info)?;
@@ -563,6 +573,7 @@ impl<'a> Import<'a> {
             "intrinsics: {with_intrinsics} of {}; exposure: {with_exposure}",
             counted(frames, "frame")
         );
+        output.push_str(&self.writer.conversion_note());
         if self.without_stamp > 0 {
             let _ = writeln!(
                 output,

@@ -7,7 +7,8 @@ use clap::Args;
 use serde_json::{Map, json};
 
 use super::frame_writer::{ChosenFrame, FrameSource, FrameWriter, summary};
-use super::recording::{WrittenArgs, drive_name, warn_of_missed};
+use super::mcap_files::drive_name;
+use super::recording::{WrittenArgs, warn_of_missed};
 use crate::error::{Error, Result};
 use crate::images::progress::Progress;
 use crate::images::workers::pool;
@@ -87,6 +88,7 @@ pub(crate) fn import(args: &VideoArgs, progress: &Progress) -> Result<Outcome> {
                 topic: path.clone(),
                 name,
                 place,
+                time: frame.time,
                 log_time: frame.time,
                 facts: Map::new(),
                 source: FrameSource::Image(frame.image),

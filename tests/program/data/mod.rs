@@ -4,6 +4,7 @@ mod hm3d;
 mod import;
 mod inputs;
 mod lerobot;
+mod odd_recordings;
 mod photographs;
 mod questions;
 mod ready_made;

@@ -9,26 +9,26 @@ use crate::support::recording::{Compression, Records, SIZE, compressed, drive, i
 use crate::support::run::{Bench, Called};
 
 /// A folder with the recording `drive.mcap`.
-fn with_recording(file: impl AsRef<[u8]>) -> Bench {
+pub(super) fn with_recording(file: impl AsRef<[u8]>) -> Bench {
     let bench = Bench::new();
     bench.file("drive.mcap", file);
     bench
 }
 
-fn import(bench: &Bench, line: &str) -> Called {
+pub(super) fn import(bench: &Bench, line: &str) -> Called {
     let words: Vec<&str> = line.split_whitespace().collect();
     bench.call(&[&["import", "mcap", "drive.mcap"], &words[..]].concat())
 }
 
 /// The lines of `out/frames.jsonl`.
-fn frames(bench: &Bench) -> Vec<Value> {
+pub(super) fn frames(bench: &Bench) -> Vec<Value> {
     let text = fs::read_to_string(bench.path("out/frames.jsonl")).unwrap();
     text.lines()
         .map(|line| serde_json::from_str(line).unwrap())
         .collect()
 }
 
-fn names(bench: &Bench) -> Vec<String> {
+pub(super) fn names(bench: &Bench) -> Vec<String> {
     let name = |line: &Value| {
         format!(
             "{}/{}",
@@ -309,7 +309,7 @@ fn unreadable_images_are_named() {
     records.topic(4, "/flat", "foxglove.RawImage", "flatbuffer", "");
     for at in [0.0, 3.0] {
         records.message(1, at, &image(at, "mono8", [2, 2], &[9; 4], 0));
-        records.message(2, at, &image(at, "nv12", [2, 2], &[9; 6], 0));
+        records.message(2, at, &image(at, "yuv420p", [2, 2], &[9; 6], 0));
         records.message(3, at, &compressed(at, "16UC1; compressedDepth png", b"x"));
         records.message(4, at, b"x");
     }
@@ -324,8 +324,8 @@ fn unreadable_images_are_named() {
         expected                            2 messages, 0.3 Hz, [TIME]
     /good   sensor_msgs/Image            2×2 mono8
                                     2 messages, 0.3 Hz, [TIME]
-    /odd    sensor_msgs/Image            not read: unknown encoding "nv12"; rgb8, bgr8, rgba8, bgra8, mono8,
-        bayer_*8 or the same with 16 ex…  2 messages, 0.3 Hz, [TIME]
+    /odd    sensor_msgs/Image            not read: unknown encoding "yuv420p"; rgb8, bgr8, rgba8, bgra8, mono8,
+        bayer_*8 or the same with 16…  2 messages, 0.3 Hz, [TIME]
     0 further topics without images
     "#);
     // The only topic that can be read is taken.
@@ -334,8 +334,8 @@ fn unreadable_images_are_named() {
     let named = import(&bench, "--topic /good --topic /odd --out out --force").ended(1);
     insta::assert_snapshot!(named.messages(), @r#"
     exit code: 1
-    ERROR drive: /odd at [TIME]: unknown encoding "nv12"; rgb8, bgr8, rgba8, bgra8, mono8, bayer_*8 or the same
-        with 16 expected
+    ERROR drive: /odd at [TIME]: unknown encoding "yuv420p"; rgb8, bgr8, rgba8, bgra8, mono8, bayer_*8 or the same
+        with 16, uyvy, yuyv, nv12, nv21, nv16, nv61 or nv24 expected
      WARN drive: /odd: 2 frames could not be read
     "#);
 
@@ -456,7 +456,7 @@ fn white_is_refused_for_files_that_state_their_codes() {
 #[test]
 fn unrelated_files_are_identified() {
     for (bytes, expected) in [
-        (&b"#ROSBAG V2.0\n"[..], "import rosbag"),
+        (&b"#ROSBAG V2.0\n"[..], "rosbags-convert"),
         (b"SQLite format 3\0", "rosbags-convert"),
         (&[0x28, 0xb5, 0x2f, 0xfd, 1, 2, 3, 4], "zstd -d"),
         (b"x", "not an MCAP file"),
@@ -517,7 +517,10 @@ fn broken_file_of_bag_keeps_others() {
     let called = bench.call(&["import", "mcap", "other"]).ended(2);
     insta::assert_snapshot!(called.messages(), @"
     exit code: 2
-    error: other: a bag of ROS 2 in SQLite; convert it: rosbags-convert --src FOLDER --dst NEW --dst-storage mcap
+    error: other: bags of ROS 2 in SQLite are not read; convert it, which changes no image:
+      pip install rosbags
+      rosbags-convert --src other/bag.db3 --dst other/bag --dst-storage mcap
+      darkqa-eval import mcap other/bag
     ");
 }
 

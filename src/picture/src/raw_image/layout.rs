@@ -68,7 +68,7 @@ impl Layout {
             }
             _ => {
                 return Err(format!(
-                    "unknown encoding {encoding:?}; rgb8, bgr8, rgba8, bgra8, mono8, bayer_*8 or the same with 16 expected"
+                    "unknown encoding {encoding:?}; rgb8, bgr8, rgba8, bgra8, mono8, bayer_*8 or the same with 16, uyvy, yuyv, nv12, nv21, nv16, nv61 or nv24 expected"
                 ));
             }
         };
