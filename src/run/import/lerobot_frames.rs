@@ -446,6 +446,7 @@ impl<'a> EpisodeImport<'a> {
             topic: camera.name.clone(),
             name: format!("{prefix}{:06}", row.frame),
             place: place_of(row, time, episode),
+            time,
             log_time: time,
             facts,
             source,
