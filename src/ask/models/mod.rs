@@ -1,5 +1,6 @@
 //! Models: remote ones at an endpoint, and built-in ones in this process.
 
+mod contradictions;
 mod finish_words;
 mod local;
 mod model;

@@ -14,6 +14,7 @@ mod chunk;
 mod encoding;
 mod exposure;
 mod ffmpeg_colours;
+mod ffmpeg_log;
 mod fields;
 mod foreign_data;
 mod image_message;

@@ -132,8 +132,14 @@ pub(super) fn ended_early_alerts<'t, D: StoredDetail + 't>(
                 .iter()
                 .map(|(word, at)| format!("{word} {}", counts_by_level(at, &replies)))
                 .collect();
+            let is_cut = words.keys().all(|word| *word == "length");
+            let ended = if is_cut {
+                "were cut at the token limit"
+            } else {
+                "ended early"
+            };
             let text = format!(
-                "{count} of {all} replies of {model} ended early without an answer, and {unread_as}: {}.{}",
+                "{count} of {all} replies of {model} {ended} without an answer, and {unread_as}: {}.{}",
                 listed.join("; "),
                 early_end_remedies(words.keys().copied())
             );
@@ -160,7 +166,7 @@ fn counts_by_level(at: &ByLevel, replies: &ByLevel) -> String {
 fn early_end_remedies<'w>(words: impl Iterator<Item = &'w str> + Clone) -> String {
     let mut text = String::new();
     if words.clone().any(|word| word == "length") {
-        text += " Those of length were cut at the token limit: the same command with a larger --max-tokens asks them again.";
+        text += " The same command with a larger --max-tokens asks those of length again.";
     }
     if words.clone().any(is_context_full) {
         text += " The model's context was full: send smaller images (--image max-side=N), or lower --max-tokens, in a new run.";
