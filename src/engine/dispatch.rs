@@ -170,6 +170,7 @@ enum FirstQuestion {
 
 impl<I: Item> ReplySink<'_, I> {
     /// Asks the trials of all groups until they end or the circuit breaker stops the run.
+    #[expect(clippy::too_many_lines, reason = "one loop over all events of a run")]
     async fn ask(mut self, mut groups: Receiver<PreparedGroup<I>>) -> Result<EndReason> {
         let concurrency = self.dispatcher.settings.concurrency.max();
         let mut lanes = Lanes::<I>::new(self.dispatcher.models, concurrency);
@@ -261,7 +262,7 @@ impl<I: Item> ReplySink<'_, I> {
             self.drain(in_flight, interrupt, grace).await?;
         }
         for (ready, refused) in self.refusals.take_rest(!self.breaker.stopped()) {
-            self.store_settled(ready, refused)?;
+            self.store_settled(&ready, refused)?;
         }
         for (source, trials) in &self.not_asked {
             tracing::warn!(
@@ -478,7 +479,7 @@ impl<I: Item> ReplySink<'_, I> {
             }
             result => {
                 for (ready, result) in self.refusals.settle((ready, result)) {
-                    self.store_settled(ready, result)?;
+                    self.store_settled(&ready, result)?;
                 }
             }
         }
@@ -488,7 +489,7 @@ impl<I: Item> ReplySink<'_, I> {
     /// Stores the reply or the failure of one trial, once a refusal is known to concern the trial or the run.
     fn store_settled(
         &mut self,
-        ready: PreparedTrial<I>,
+        ready: &PreparedTrial<I>,
         result: Result<Reply, AskError>,
     ) -> Result<()> {
         let trial = &ready.trial;
@@ -542,7 +543,9 @@ impl<I: Item> ReplySink<'_, I> {
             Ok(reply) => answered(blank, reply)?,
             Err(error) => Record {
                 lost: *error.lost,
-                finish: error.finish.map(|word| Finish::Other(word).shorten()),
+                finish: error
+                    .finish
+                    .map(|word| Finish::Other(word.into()).shorten()),
                 ..blank.with_failure(error.failure, error.attempts)
             },
         };

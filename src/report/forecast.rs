@@ -186,6 +186,7 @@ pub(crate) fn json(forecast: &Forecast) -> Result<String> {
 
 /// Formats the forecast for the terminal.
 #[must_use]
+#[expect(clippy::too_many_lines, reason = "one column after another")]
 pub(crate) fn render(forecast: &Forecast) -> String {
     let table = TableBuilder::new("estimate", &forecast.lines)
         .column(Text, "terminal model", |line| line.model.clone())

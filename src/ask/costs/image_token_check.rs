@@ -46,7 +46,7 @@ pub(crate) struct ImageTokenCheck {
 #[derive(Debug, Clone, Copy)]
 struct Counted {
     /// Estimate of the tokens that the server counts.
-    counted: f64,
+    tokens: f64,
     /// Tokens by the rule of the model's family.
     expected: f64,
     is_shrunk: bool,
@@ -77,7 +77,7 @@ impl ImageTokenCheck {
         let most = (charged - characters / MAX_CHARACTERS_PER_TOKEN) / images;
         let counted = (charged - characters / USUAL.0 - USUAL.1) / images;
         self.replies.push(Counted {
-            counted,
+            tokens: counted,
             expected,
             is_shrunk: most < MAX_SHARE * expected && counted >= MIN_COUNTED,
         });
@@ -102,9 +102,9 @@ impl ImageTokenCheck {
         let middle = |values: Vec<f64>| values[values.len() / 2];
         let spread = |values: &[f64]| values[values.len() - 1] / values[0];
         let is_same = spread(&of_all(|one| one.expected)) >= OTHER_SIZE
-            && spread(&of_all(|one| one.counted)) <= 1.0 + SAME;
+            && spread(&of_all(|one| one.tokens)) <= 1.0 + SAME;
         Some(ShrunkImages {
-            counted: middle(sorted(&large, |one| one.counted)),
+            counted: middle(sorted(&large, |one| one.tokens)),
             expected: middle(sorted(&large, |one| one.expected)),
             replies: large.len(),
             is_same,

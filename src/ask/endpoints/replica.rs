@@ -144,7 +144,7 @@ impl Replica {
                 let message = format!("{} answered with {}", self.base(), scrub.line(&description));
                 AskError {
                     retry: Retry::AfterDelay,
-                    finish: finish.map(|word| scrub.line(&word)),
+                    finish: finish.map(|word| scrub.line(&word).into_boxed_str()),
                     unfinished: if broke_off {
                         Unfinished::BrokeOff
                     } else {

@@ -106,7 +106,7 @@ pub struct AskError {
     /// Attempts that were charged.
     pub lost: Box<LostAttempts>,
     /// Finish reason of the server, if it is the reason for the missing reply.
-    pub finish: Option<String>,
+    pub finish: Option<Box<str>>,
     /// The refusal, if it may concern the content of this request alone.
     pub refusal: Option<Box<Refusal>>,
     pub(crate) retry: Retry,

@@ -47,20 +47,19 @@ impl FinishWords {
     {
         let Finish::Other(word) = first.finish.clone() else {
             // Thoughts without an answer.
-            return match may_pay {
-                true => join(first, ask_again().await),
-                false => Ok(first),
-            };
+            if !may_pay {
+                return Ok(first);
+            }
+            return join(first, ask_again().await);
         };
         let known = self.word(&word);
         let mut verdict = known.lock().await;
         match *verdict {
-            Some(Verdict::Deliberate) => Ok(first),
             Some(Verdict::BrokenOff) if may_pay => {
                 drop(verdict);
                 join(first, ask_again().await)
             }
-            Some(Verdict::BrokenOff) => Err(broken_off(first, word)),
+            Some(Verdict::BrokenOff) => Err(broken_off(&first, word)),
             None if may_pay => {
                 let second = ask_again().await;
                 *verdict = second.as_ref().ok().map(|second| match &second.finish {
@@ -69,8 +68,8 @@ impl FinishWords {
                 });
                 join(first, second)
             }
-            // Nothing shows that another try would have an answer.
-            None => Ok(first),
+            // The model's own end, or nothing shows that another try would have an answer.
+            Some(Verdict::Deliberate) | None => Ok(first),
         }
     }
 
@@ -99,7 +98,7 @@ fn join(first: Reply, second: Result<Reply, AskError>) -> Result<Reply, AskError
             Err(AskError {
                 attempts: first.attempts + error.attempts,
                 lost: Box::new(lost.plus(*error.lost)),
-                finish: error.finish.or(word),
+                finish: error.finish.or(word.map(String::into_boxed_str)),
                 ..error
             })
         }
@@ -107,14 +106,14 @@ fn join(first: Reply, second: Result<Reply, AskError>) -> Result<Reply, AskError
 }
 
 /// Error of a reply whose generation broke off, and which must not be paid for again.
-fn broken_off(reply: Reply, word: String) -> AskError {
+fn broken_off(reply: &Reply, word: String) -> AskError {
     let message = format!(
         "a reply that broke off: its finish_reason is {word:?}, and --retries paid allows no other try"
     );
     let mut lost = reply.lost;
     lost.add(reply.usage);
     AskError {
-        finish: Some(word),
+        finish: Some(word.into_boxed_str()),
         ..AskError::new(FailureKind::Response, message).with_attempts(reply.attempts, lost)
     }
 }

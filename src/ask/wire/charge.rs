@@ -25,7 +25,7 @@ use crate::types::{ServiceTier, StatedCost};
 pub(super) fn cost_in_body(body: &Value) -> Option<StatedCost> {
     let usage = body.get("usage").and_then(Value::as_object);
     let in_usage = usage.and_then(cost_in_usage);
-    let beside = body.as_object().and_then(|fields| named_in_dollars(fields));
+    let beside = body.as_object().and_then(named_in_dollars);
     let gateway = body
         .pointer("/choices/0/message/provider_metadata/gateway")
         .and_then(Value::as_object)
@@ -67,13 +67,13 @@ pub(super) fn tier(body: &Value) -> Option<ServiceTier> {
 fn cost_in_usage(usage: &Map<String, Value>) -> Option<StatedCost> {
     let named = named_in_dollars(usage);
     if let Some(unit) = foreign_unit(usage) {
-        warn_once(format!("a charge in {unit}, not in US dollars"));
+        warn_once(&format!("a charge in {unit}, not in US dollars"));
         return named;
     }
     let cost = match usage.get("cost") {
         Some(Value::Object(parts)) => match foreign_unit(parts) {
             Some(unit) => {
-                warn_once(format!("a charge in {unit}, not in US dollars"));
+                warn_once(&format!("a charge in {unit}, not in US dollars"));
                 None
             }
             None => ["total_cost", "total"]
@@ -170,7 +170,7 @@ fn named_in_dollars(fields: &Map<String, Value>) -> Option<StatedCost> {
 fn in_dollars(name: &str, dollars: f64) -> Option<StatedCost> {
     let cost = StatedCost::from_dollars(dollars);
     if cost.is_none() {
-        warn_once(format!(
+        warn_once(&format!(
             "{name} of {dollars}, no plausible charge in US dollars"
         ));
     }
@@ -188,7 +188,7 @@ fn number(value: &Value) -> Option<f64> {
 const MAX_WARNINGS: usize = 3;
 
 /// Warns, once for each text, of a charge that does not count.
-fn warn_once(problem: String) {
+fn warn_once(problem: &str) {
     static WARNED: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
     // Numbers differ from reply to reply: one warning for each kind.
     let kind: String = problem.chars().filter(|c| !c.is_ascii_digit()).collect();

@@ -35,7 +35,9 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, ReplyError>
     }
     let reason = choice.get("finish_reason").and_then(Value::as_str);
     let Ending { finish, may_heal } = finish_reason::read(reason.unwrap_or_default(), usage)
-        .map_err(|incomplete| error_in_text(choice).unwrap_or_else(|| incomplete.into()))?;
+        .map_err(|incomplete| {
+            error_in_text(choice).unwrap_or(ReplyError::Unreadable(incomplete))
+        })?;
     let message = choice
         .get("message")
         .filter(|message| message.is_object())

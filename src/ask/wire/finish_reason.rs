@@ -40,7 +40,7 @@ pub(super) struct Ending {
 ///
 /// # Errors
 /// If the server gave the generation up. The error includes `usage`, the tokens charged.
-pub(super) fn read(reason: &str, usage: Option<Usage>) -> Result<Ending, Unreadable> {
+pub(super) fn read(reason: &str, usage: Option<Usage>) -> Result<Ending, Box<Unreadable>> {
     let name = Finish::normalized(reason);
     let reasons = &*REASONS;
     let other = Finish::Other(reason.trim().to_owned());
@@ -55,13 +55,13 @@ pub(super) fn read(reason: &str, usage: Option<Usage>) -> Result<Ending, Unreada
     } else if reasons.context.contains(&name) || reasons.loops.contains(&name) || other.is_whole() {
         other
     } else if reasons.broken.contains(&name) {
-        return Err(Unreadable {
+        return Err(Box::new(Unreadable {
             usage,
             finish: Some(reason.to_owned()),
             ..Unreadable::new(format!(
                 "a reply that broke off: its finish_reason is {reason:?}"
             ))
-        });
+        }));
     } else {
         return Ok(Ending {
             finish: other,
@@ -105,11 +105,11 @@ mod tests {
         );
     }
 
-    fn certain(finish: Finish) -> Result<Ending, Unreadable> {
-        Ok(Ending {
+    fn certain(finish: Finish) -> Ending {
+        Ending {
             finish,
             may_heal: false,
-        })
+        }
     }
 
     #[test]
@@ -128,7 +128,10 @@ mod tests {
     #[test]
     fn words_of_context_and_loops_are_kept() {
         for word in ["model_context_window_exceeded", "Repetition", "repeat"] {
-            assert_eq!(read(word, None), certain(Finish::Other(word.to_owned())));
+            assert_eq!(
+                read(word, None),
+                Ok(certain(Finish::Other(word.to_owned())))
+            );
         }
         assert!(is_context_full("MODEL-LENGTH") && !is_context_full("length"));
     }
@@ -149,12 +152,12 @@ mod tests {
 
     #[test]
     fn known_reasons_are_parsed_in_any_case() {
-        assert_eq!(read("END_TURN", None), certain(Finish::Stop));
+        assert_eq!(read("END_TURN", None), Ok(certain(Finish::Stop)));
         assert_eq!(
             read("tool_use", None),
-            certain(Finish::Other("tool_use".to_owned()))
+            Ok(certain(Finish::Other("tool_use".to_owned())))
         );
-        assert_eq!(read("MAX_TOKENS", None), certain(Finish::Length));
+        assert_eq!(read("MAX_TOKENS", None), Ok(certain(Finish::Length)));
         for word in [
             "SAFETY",
             "RECITATION",
@@ -162,8 +165,8 @@ mod tests {
             "guardrail_intervened",
             "sensitive",
         ] {
-            assert_eq!(read(word, None), certain(Finish::Filter), "{word}");
+            assert_eq!(read(word, None), Ok(certain(Finish::Filter)), "{word}");
         }
-        assert_eq!(read("", None), certain(Finish::Unknown));
+        assert_eq!(read("", None), Ok(certain(Finish::Unknown)));
     }
 }

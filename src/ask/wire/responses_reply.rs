@@ -101,10 +101,8 @@ fn finish(response: &Value, usage: Option<Usage>) -> Result<Ending, ReplyError> 
         "incomplete" => {
             let details = response.get("incomplete_details");
             let reason = owned_text(details.and_then(|details| details.get("reason")));
-            Ok(finish_reason::read(
-                reason.as_deref().unwrap_or("incomplete"),
-                usage,
-            )?)
+            finish_reason::read(reason.as_deref().unwrap_or("incomplete"), usage)
+                .map_err(ReplyError::Unreadable)
         }
         status => Err(
             Unreadable::new(format!("a response whose status is {status:?}"))

@@ -50,7 +50,7 @@ pub(crate) struct VideoFrame {
 /// Conversion of the frames of a video to sRGB.
 #[derive(Debug)]
 struct Conversion {
-    conversion: FrameConversion,
+    rule: FrameConversion,
     /// Number of pixels so far, and of those with light above white.
     pixels: usize,
     clipped: usize,
@@ -171,16 +171,12 @@ impl Video {
             }
             None => None,
         };
-        match conversion {
-            Some(conversion) => {
-                drop(frames);
-                self.decode(select, Some(conversion))
-            }
-            None => {
-                frames.first = Some(first);
-                Ok(frames)
-            }
+        if let Some(conversion) = conversion {
+            drop(frames);
+            return self.decode(select, Some(conversion));
         }
+        frames.first = Some(first);
+        Ok(frames)
     }
 
     /// Starts ffmpeg. Frames that are converted are decoded to 16 bits.
@@ -235,14 +231,14 @@ impl Video {
 impl Conversion {
     fn new(conversion: FrameConversion) -> Self {
         Self {
-            conversion,
+            rule: conversion,
             pixels: 0,
             clipped: 0,
         }
     }
 
     fn convert(&mut self, samples: &[u16]) -> Vec<u8> {
-        let (converted, clipped) = self.conversion.convert(samples);
+        let (converted, clipped) = self.rule.convert(samples);
         self.pixels += samples.len() / 3;
         self.clipped += clipped;
         converted
@@ -321,7 +317,7 @@ impl VideoFrames {
                 .map_or("sRGB codes", FrameConversion::name)
                 .to_owned()
         };
-        let expected = name(self.conversion.as_ref().map(|known| &known.conversion));
+        let expected = name(self.conversion.as_ref().map(|known| &known.rule));
         let found = match found.conversion(&self.path) {
             Ok(conversion) => name(conversion.as_ref()),
             Err(problem) => problem,
@@ -336,16 +332,14 @@ impl VideoFrames {
 
     /// Name of the colours that are converted to sRGB; `None` if the codes are taken as sRGB codes.
     pub(crate) fn converted_from(&self) -> Option<&str> {
-        self.conversion
-            .as_ref()
-            .map(|found| found.conversion.name())
+        self.conversion.as_ref().map(|found| found.rule.name())
     }
 
     /// Share of the pixels so far whose light is above white and was clipped; `None` if the video is not HDR.
     pub(crate) fn clipped_share(&self) -> Option<f64> {
         let found = self.conversion.as_ref()?;
         found
-            .conversion
+            .rule
             .is_hdr()
             .then(|| found.clipped as f64 / found.pixels.max(1) as f64)
     }

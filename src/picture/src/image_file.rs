@@ -174,7 +174,6 @@ impl ImageFile {
             return self.ink_colours().ok().map(|inks| inks.note());
         }
         match (self.rule.colour, colour.meaning(depth.code_depth())) {
-            (_, Ok(Meaning::Srgb)) => None,
             (ColourRule::Ignore, Ok(Meaning::Other(space))) => {
                 Some(space.note(ColourHandling::Ignored))
             }
@@ -183,7 +182,7 @@ impl ImageFile {
                 profile: None,
                 handling: ColourHandling::Ignored,
             }),
-            (_, Err(_) | Ok(Meaning::Linear)) => None,
+            (_, Err(_) | Ok(Meaning::Linear | Meaning::Srgb)) => None,
             (rule, Ok(Meaning::Other(space))) => {
                 let is_refused =
                     rule == ColourRule::Convert && space.handling == ColourHandling::Clipped;

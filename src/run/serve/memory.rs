@@ -40,16 +40,14 @@ impl MemoryBound {
     pub(super) async fn take(&self, amount: usize) -> Result<OwnedSemaphorePermit, RequestFault> {
         let units = amount.div_ceil(self.unit).min(self.whole) as u32;
         let free = Arc::clone(&self.free).acquire_many_owned(units);
-        match tokio::time::timeout(MAX_WAIT, free).await {
-            Ok(Ok(permit)) => Ok(permit),
-            Ok(Err(_)) | Err(_) => {
-                let message = format!(
-                    "the requests in flight together have {}: send fewer or smaller ones at a time",
-                    self.name
-                );
-                Err(RequestFault::new(StatusCode::SERVICE_UNAVAILABLE, message))
-            }
+        if let Ok(Ok(permit)) = tokio::time::timeout(MAX_WAIT, free).await {
+            return Ok(permit);
         }
+        let message = format!(
+            "the requests in flight together have {}: send fewer or smaller ones at a time",
+            self.name
+        );
+        Err(RequestFault::new(StatusCode::SERVICE_UNAVAILABLE, message))
     }
 }
 

@@ -141,7 +141,7 @@ pub(super) fn ended_early_alerts<'t, D: StoredDetail + 't>(
             let text = format!(
                 "{count} of {all} replies of {model} {ended} without an answer, and {unread_as}: {}.{}",
                 listed.join("; "),
-                early_end_remedies(words.keys().copied())
+                early_end_remedies(&words)
             );
             Alert::new(AlertKind::Unread, text)
         })
@@ -163,12 +163,12 @@ fn counts_by_level(at: &ByLevel, replies: &ByLevel) -> String {
 }
 
 /// Remedies for early ends that a setting of the run causes; empty without any.
-fn early_end_remedies<'w>(words: impl Iterator<Item = &'w str> + Clone) -> String {
+fn early_end_remedies(words: &BTreeMap<&str, ByLevel>) -> String {
     let mut text = String::new();
-    if words.clone().any(|word| word == "length") {
+    if words.contains_key("length") {
         text += " The same command with a larger --max-tokens asks those of length again.";
     }
-    if words.clone().any(is_context_full) {
+    if words.keys().any(|word| is_context_full(word)) {
         text += " The model's context was full: send smaller images (--image max-side=N), or lower --max-tokens, in a new run.";
     }
     text

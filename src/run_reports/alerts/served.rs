@@ -55,11 +55,10 @@ pub(super) fn has_several(names: &BTreeSet<String>) -> bool {
 /// The id of a model at its endpoint, or its name in tables if no run states it.
 fn asked_id<'a>(runs: &'a [JoinedRun], model: &'a str) -> &'a str {
     runs.iter()
-        .filter_map(|run| {
+        .find_map(|run| {
             let models = run.manifest.columns.get("model")?;
             models.get(without_run(model))?.get("--model")?.as_str()
         })
-        .next()
         .unwrap_or(model)
 }
 

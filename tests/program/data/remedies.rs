@@ -12,8 +12,8 @@ struct Remedy {
     command: &'static str,
     /// Part of the message, which is printed by `command` alone.
     message: &'static str,
-    /// The remedy, as printed.
-    remedy: &'static str,
+    /// The command or flag of the remedy, as printed.
+    printed: &'static str,
     /// What the remedy makes of the state, where it is a command of another program.
     effect: fn(&Bench),
     /// The command with the remedy.
@@ -78,7 +78,7 @@ const REMEDIES: [Remedy; 4] = [
         state: pairs,
         command: "check --model random --questions q.jsonl --pairs set",
         message: "no pairs in it",
-        remedy: "--pairs NORMAL,LOW names any two folders",
+        printed: "--pairs NORMAL,LOW names any two folders",
         effect: nothing,
         followed: "check --model random --questions q.jsonl --pairs set/target,set/input",
     },
@@ -87,7 +87,7 @@ const REMEDIES: [Remedy; 4] = [
         state: pairs,
         command: "realism set",
         message: "no pairs in it",
-        remedy: "--normal DIR and --low DIR name any two folders, instead of PAIRS",
+        printed: "--normal DIR and --low DIR name any two folders, instead of PAIRS",
         effect: nothing,
         followed: "realism --normal set/target --low set/input",
     },
@@ -96,7 +96,7 @@ const REMEDIES: [Remedy; 4] = [
         state: saved_to_disk,
         command: "check --model random --levels L0 --data saved",
         message: "Arrow files",
-        remedy: "to_parquet('set.parquet')",
+        printed: "to_parquet('set.parquet')",
         effect: |bench| parquet(bench, "saved/set.parquet"),
         followed: "check --model random --levels L0 --data saved",
     },
@@ -105,7 +105,7 @@ const REMEDIES: [Remedy; 4] = [
         state: saved_splits,
         command: "check --model random --levels L0 --data saved",
         message: "Arrow files by split",
-        remedy: "--read split=NAME",
+        printed: "--read split=NAME",
         effect: |bench| parquet(bench, "saved/train.parquet"),
         followed: "check --model random --levels L0 --data saved --read split=train",
     },
@@ -124,7 +124,7 @@ fn remedies_as_printed_lead_on() {
         let bench = Bench::new();
         (row.state)(&bench);
         let first = said(&bench, row.command);
-        for part in [row.message, row.remedy] {
+        for part in [row.message, row.printed] {
             assert!(first.contains(part), "{}: {part} in: {first}", row.name);
         }
         (row.effect)(&bench);

@@ -19,7 +19,8 @@ fn bench(sizes: &[(u32, u32)]) -> Bench {
             "question": format!("What color is it, {number}?"),
             "choices": ["red", "blue", "brown"], "answer": "brown",
         });
-        lines += &format!("{question}\n");
+        lines += &question.to_string();
+        lines.push('\n');
     }
     bench.file("set.jsonl", lines);
     bench

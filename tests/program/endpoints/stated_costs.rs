@@ -411,6 +411,15 @@ fn share(seed: u64) -> f64 {
     ((mixed ^ (mixed >> 32)) >> 11) as f64 / (1_u64 << 53) as f64
 }
 
+/// Charge so far, dearest reply so far, requests in flight with their charges, and the excess that they may cause.
+#[derive(Default)]
+struct State {
+    charged: f64,
+    dearest: f64,
+    in_flight: f64,
+    excess: f64,
+}
+
 /// A run at a server that charges up to ten times the list price: its charge beyond the limit, and the most that it may be, which is what
 /// was in flight when replies were dearer than any before.
 fn simulate(seed: u64) -> (f64, f64) {
@@ -421,14 +430,6 @@ fn simulate(seed: u64) -> (f64, f64) {
     let concurrency = 1 + (of(3) * 15.0) as usize;
     let limit = LIST * (3.0 + 40.0 * of(4));
     let bench = Bench::with_questions(60);
-    /// Charge so far, dearest reply so far, requests in flight with their charges, and the excess that they may cause.
-    #[derive(Default)]
-    struct State {
-        charged: f64,
-        dearest: f64,
-        in_flight: f64,
-        excess: f64,
-    }
     let state = Arc::new(Mutex::new(State::default()));
     let number = AtomicUsize::new(0);
     let vendor = VENDORS[(seed % VENDORS.len() as u64) as usize].1;

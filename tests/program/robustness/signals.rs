@@ -149,7 +149,7 @@ fn signals_end_a_run_after_its_last_reply() {
     let bench = Bench::new();
     let (reader, mut writer) = std::io::pipe().unwrap();
     // A pipe takes 64 KiB: the program waits at its first word on standard output.
-    writer.write_all(&[0; 1 << 16]).unwrap();
+    writer.write_all(&vec![0; 1 << 16]).unwrap();
     let line = "--model random --levels L0 --data rooms:frames=2,size=96x64 --out run";
     for name in ["-TERM", "-HUP"] {
         let stdout = Stdio::from(writer.try_clone().unwrap());

@@ -203,7 +203,6 @@ const NO_REMEDY: &str = "";
 /// Bodies of servers, with the status, the words of the remedy, and the kind. Rows without a remedy are causes that no flag changes, or
 /// that nobody understands.
 #[test]
-#[expect(clippy::too_many_lines, reason = "a table")]
 fn remedies_come_from_the_body() {
     use FailureKind::{Filtered, RateLimit, Request};
     const WAF: &str = "<html>\r\n<head><title>403 Forbidden</title></head>\r\n<body>\r\n<center><h1>403 Forbidden</h1></center>\r\n</body>\r\n</html>";

@@ -99,7 +99,7 @@ static RANGE: LazyLock<Regex> = LazyLock::new(|| {
 /// The mark in the reply of a judge, without its thoughts.
 pub(super) fn mark(reply: &str) -> Option<i64> {
     let tidy = tidy(reply);
-    if let Some(found) = json(&tidy) {
+    if let Some(Stated(found)) = json(&tidy) {
         return found;
     }
     let text = SCALE.replace_all(&tidy, " ");
@@ -120,17 +120,21 @@ pub(super) fn mark(reply: &str) -> Option<i64> {
         .or_else(|| at_an_end(&text))
         .or_else(|| in_sentences(&text, &FRACTION))
         .or_else(|| in_sentences(&text, &VERB))?
+        .0
 }
 
-/// The marks after a pattern in the sentences that state them: `None` without any, `Some(None)` if they differ.
-fn in_sentences(text: &str, pattern: &Regex) -> Option<Option<i64>> {
+/// The marks that a reply states in one form; `None` in it if they differ.
+struct Stated(Option<i64>);
+
+/// The marks after a pattern in the sentences that state them; `None` without any.
+fn in_sentences(text: &str, pattern: &Regex) -> Option<Stated> {
     let found: Vec<Option<i64>> = text
         .lines()
         .flat_map(sentences)
         .filter(|sentence| !HEDGE.is_match(sentence))
         .filter_map(|sentence| Some(number(pattern.captures(sentence)?.name("after")?.as_str())))
         .collect();
-    (!found.is_empty()).then(|| common(&found))
+    (!found.is_empty()).then(|| Stated(common(&found)))
 }
 
 /// The sentences of a line. A full stop inside a number ends none.
@@ -140,7 +144,7 @@ fn sentences(line: &str) -> impl Iterator<Item = &str> {
 }
 
 /// The mark that the reply begins or ends with: "4 - close", or 4 on the last line.
-fn at_an_end(text: &str) -> Option<Option<i64>> {
+fn at_an_end(text: &str) -> Option<Stated> {
     let lines = || {
         text.lines()
             .map(|line| line.trim_matches(is_sign))
@@ -150,7 +154,7 @@ fn at_an_end(text: &str) -> Option<Option<i64>> {
     let last = lines().next_back()?;
     let is_alone = |line: &str| !line.is_empty() && line.chars().all(|c| c.is_ascii_digit());
     if is_alone(last) {
-        return Some(number(last));
+        return Some(Stated(number(last)));
     }
     let digits = first
         .find(|c: char| !c.is_ascii_digit())
@@ -160,11 +164,11 @@ fn at_an_end(text: &str) -> Option<Option<i64>> {
         || after.starts_with([
             ':', '：', '-', '–', '—', '.', ',', '(', '/', '*', '_', '`', ')', '"',
         ]);
-    (digits > 0 && is_explained).then(|| number(first))
+    (digits > 0 && is_explained).then(|| Stated(number(first)))
 }
 
-/// The marks in JSON objects under a key for a mark: `None` without any, `Some(None)` if they differ.
-fn json(text: &str) -> Option<Option<i64>> {
+/// The marks in JSON objects under a key for a mark; `None` without any.
+fn json(text: &str) -> Option<Stated> {
     let (mut found, mut from) = (Vec::new(), 0);
     while let Some(at) = text[from..].find('{') {
         let start = from + at;
@@ -182,14 +186,14 @@ fn json(text: &str) -> Option<Option<i64>> {
             _ => start + 1,
         };
     }
-    (!found.is_empty()).then(|| common(&found))
+    (!found.is_empty()).then(|| Stated(common(&found)))
 }
 
 fn value_mark(value: &Value) -> Option<i64> {
     match value {
         Value::Number(number) => {
-            let whole = number.as_f64().filter(|number| number.fract() == 0.0)?;
-            (1..=5).find(|mark| *mark as f64 == whole)
+            let whole = number.as_f64().filter(|number| number.fract() == 0.0)? as i64;
+            (1..=5).contains(&whole).then_some(whole)
         }
         Value::String(text) => number(text),
         _ => None,

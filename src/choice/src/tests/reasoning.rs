@@ -118,7 +118,7 @@ proptest! {
         let (begin, end) = pairs(&name, &other).swap_remove(pair);
         let reply = format!("{begin}{thought}{end}{answer}{tail}");
         prop_assert_eq!(both(&reply), [Answer::Chosen(1); 2], "{}", reply);
-        let is_heading = pair >= CLOSING + 1;
+        let is_heading = pair > CLOSING;
         if !is_heading {
             let stated = format!("{begin}{thought}{end}\nI think that it is a bedroom.");
             prop_assert_eq!(both(&stated)[1], Answer::Chosen(1), "{}", stated);

@@ -341,7 +341,7 @@ impl<'t, 'a> Marked<'t, 'a> {
         // The same token before and after the thoughts.
         let repeated = singles
             .last()
-            .filter(|_| closing.is_none() && singles.len() % 2 == 0);
+            .filter(|_| closing.is_none() && singles.len().is_multiple_of(2));
         closing.or(repeated.copied()).map(|mark| mark.end)
     }
 
@@ -540,9 +540,9 @@ fn without_tokens_around(text: &str) -> &str {
         {
             end = mark.start;
             last -= 1;
-        } else if let Some(mark) = front.filter(|mark| {
-            mark.is_token() && (back.is_some_and(|back| back.is_token()) || !has_end())
-        }) {
+        } else if let Some(mark) =
+            front.filter(|mark| mark.is_token() && (back.is_some_and(Mark::is_token) || !has_end()))
+        {
             start = mark.end;
             first += 1;
         } else if let Some(mark) = back.filter(|mark| {

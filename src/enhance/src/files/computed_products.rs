@@ -42,7 +42,7 @@ fn find(model: &[u8]) -> Result<BTreeSet<String>, Malformed> {
     // A stack instead of recursion, so that deep nesting cannot overflow the call stack.
     while let Some((body, nodes, mut constants)) = bodies.pop() {
         if nodes == 1 {
-            constants.extend(initializers(model, body.clone())?);
+            constants.extend(initializers(model, body.clone()));
         }
         for node in byte_fields(model, body, nodes) {
             let node = Node::read(model, node)?;
@@ -74,7 +74,7 @@ fn find(model: &[u8]) -> Result<BTreeSet<String>, Malformed> {
 }
 
 /// Names of the initializers of a graph that no input overrides.
-fn initializers(model: &[u8], graph: Range<usize>) -> Result<HashSet<String>, Malformed> {
+fn initializers(model: &[u8], graph: Range<usize>) -> HashSet<String> {
     let name_of = |message: Range<usize>, number| {
         byte_fields(model, message, number)
             .next()
@@ -93,7 +93,7 @@ fn initializers(model: &[u8], graph: Range<usize>) -> Result<HashSet<String>, Ma
             names.remove(&name_of(input, 1).unwrap_or_default());
         }
     }
-    Ok(names)
+    names
 }
 
 /// A `NodeProto`, as far as it shows what is computed.

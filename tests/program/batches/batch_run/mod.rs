@@ -159,7 +159,8 @@ fn early_ends_are_unread_in_batches() {
     fn refused(i: usize) -> Line {
         [Line::Right, Line::Status(400, "an odd refusal")][i % 2]
     }
-    let rows: [(fn(usize) -> Line, fn(usize) -> Line, usize); 4] = [
+    type Lines = fn(usize) -> Line;
+    let rows: [(Lines, Lines, usize); 4] = [
         (known, known, 1),
         (unknown, |_| Line::Ended("NO_IMAGE"), 2),
         (moderated, moderated, 1),
