@@ -77,8 +77,8 @@ fn cut_trial_is_asked_once_in_next_call() {
     let second = call(&bench, &mock, "--wire chat");
     assert_eq!((second.code, mock.requests().len()), (Some(1), 10));
     insta::assert_snapshot!(redacted(&second.stderr), @r#"
-    WARN 1 trial was given up by a gateway in an earlier call, and may have been charged: it is asked once more, as
-       a stream if --request wire permits, and given up at the next timeout
+    WARN 1 trial was given up by a gateway in an earlier call, and may have been charged: it is asked once more,
+       as a stream if --request wire permits, and given up at the next timeout
     WARN m: a trial about a.png failed: http://127.0.0.1:[PORT]/v1 answered 524: an HTML page titled "524: A
        timeout occurred" (given up: a gateway ends the request before the reply is complete, and the server may
        charge it each time; --request wire=chat-stream asks for a stream, which gateways let through)

@@ -217,8 +217,8 @@ fn record_table_keeps_odd_texts() {
     ));
     insta::assert_snapshot!(call.messages(), @"
     exit code: 1
-     WARN m: a trial about a.png failed: http://127.0.0.1:[PORT]/v1 answered 413: no such image (send smaller images:
-        --image max-side=N, or --image jpeg:95)
+     WARN m: a trial about a.png failed: http://127.0.0.1:[PORT]/v1 answered 413: no such image (send smaller
+        images: --image max-side=N, or --image jpeg:95)
      WARN run/records.parquet: numbers that are too large for the column prompt_tokens, and are null in it: 1;
         records.jsonl has them
     ");

@@ -309,6 +309,6 @@ fn unread_image_folder_names_remedy() {
      WARN photos: 1 file looks like an image and is not read, as IMG_1.HEIC; PNG, JPEG, WebP, TIFF, BMP or OpenEXR
         expected, so convert them first
     error: photos: no pairs in it; expected are folders normal and low (or high and low, val_rgb_h and val_rgb_l),
-        or files like normal1.png and low1.png; --normal DIR and --low DIR name any two folders
+        or files like normal1.png and low1.png; --normal DIR and --low DIR name any two folders, instead of PAIRS
     ");
 }
