@@ -216,23 +216,26 @@ impl AskError {
             300..400 => {
                 Self::permanent("redirects are not followed: give the final address as --base-url")
             }
-            401 if !sent.has_key => Self::of_status(
+            401 if !sent.has_key => Self::permanent(
                 "no key was sent: set OPENAI_API_KEY, or name another variable or a file with --api-key-env or --api-key-file",
             ),
-            401 => Self::of_status(CHECK_KEY),
+            401 => Self::permanent(CHECK_KEY),
             407 => Self::permanent(
                 "the proxy asks for a user and password: set them in HTTP_PROXY, or name the host in NO_PROXY",
             ),
             400..429 | 430..500 if is_moderated(status, api_error) => {
                 Self::new(FailureKind::Filtered, String::new())
             }
-            402 => Self::of_status(PAY),
+            402 => Self::permanent(PAY),
             403 if (says_nothing || !api_error.mentions_any(&vocabulary::CONTENT))
                 && (mentions(&vocabulary::WRONG_KEY)
                     || mentions(&vocabulary::NO_RIGHT)
                     || mentions(&vocabulary::MODEL)) =>
             {
-                Self::permanent_if(!says_nothing, CHECK_RIGHT)
+                Self::permanent_if(
+                    !says_nothing && mentions(&vocabulary::WRONG_KEY),
+                    CHECK_RIGHT,
+                )
             }
             404 | 410
                 if api_error.page.is_some()
@@ -247,7 +250,7 @@ impl AskError {
             }
             // The words say something else, which may concern this request alone.
             403 | 404 | 410 => Self::of_status(""),
-            405 => Self::of_status(&format!(
+            405 => Self::permanent(&format!(
                 "check --base-url: requests go to its path with /{} behind it",
                 wire.path()
             )),

@@ -5,6 +5,7 @@ use serde_json::Value;
 use super::finish_reason::{self, Ending};
 use super::json_body;
 use super::logprobs;
+use super::message_fields::{refusal_field, words};
 use super::other_field;
 use super::stream;
 use super::usage;
@@ -104,19 +105,6 @@ fn first_choice(completion: &Value) -> Result<&Value, &'static str> {
         .ok_or("a completion with no choices in it")
 }
 
-/// The refusal of a message or of a piece of one: its field `refusal`, or that of one of its objects. LiteLLM keeps fields that it does not
-/// know in `provider_specific_fields`, LangChain in `additional_kwargs`.
-pub(super) fn refusal_field(message: &Value) -> Option<&str> {
-    let objects = message
-        .as_object()
-        .into_iter()
-        .flat_map(|fields| fields.values());
-    std::iter::once(message)
-        .chain(objects.filter(|value| value.is_object()))
-        .filter_map(|value| value.get("refusal")?.as_str())
-        .find(|text| !text.is_empty())
-}
-
 /// Error in the text of an incomplete reply, if its wording is known: LMDeploy sends errors in this way.
 fn error_in_text(choice: &Value) -> Option<ReplyError> {
     let text = choice.pointer("/message/content")?.as_str()?;
@@ -144,11 +132,6 @@ fn content(content: Option<&Value>) -> Result<(String, Option<String>), &'static
         }
     }
     Ok((text, (!refusal.is_empty()).then_some(refusal)))
-}
-
-/// A text field of a content part; empty if it is absent.
-pub(super) fn words<'a>(part: &'a Value, field: &str) -> &'a str {
-    part.get(field).and_then(Value::as_str).unwrap_or_default()
 }
 
 /// Description of a lost reply.

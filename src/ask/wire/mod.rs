@@ -10,6 +10,7 @@ mod finish_reason;
 mod image_places;
 mod json_body;
 mod logprobs;
+mod message_fields;
 mod other_field;
 mod refusal;
 mod responses_reply;

@@ -3,7 +3,7 @@
 
 use serde_json::Value;
 
-use super::chat_reply::words;
+use super::message_fields::words;
 use crate::ask::replies::bounded_json::parse;
 use crate::types::OtherField;
 

@@ -2,10 +2,11 @@
 
 use serde_json::Value;
 
-use super::chat_reply::{is_end, words};
+use super::chat_reply::is_end;
 use super::finish_reason::{self, Ending};
 use super::json_body;
 use super::logprobs;
+use super::message_fields::words;
 use super::other_field::{text_of, tool_call};
 use super::stream;
 use super::usage;

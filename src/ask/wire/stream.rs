@@ -1,6 +1,6 @@
 //! Event streams of replies: [`events`] parses a stream, [`assemble`] joins the chunks of a chat completion.
 
-use super::chat_reply::refusal_field;
+use super::message_fields::refusal_field;
 use serde_json::{Map, Value, json};
 
 use crate::ask::failures::find_error;

@@ -42,13 +42,10 @@ use completion::{Completion, RequestFault};
 use frame_matcher::FrameMatcher;
 use memory::MemoryBound;
 use parsed_question::ParsedQuestion;
-use request::ServedQuestion;
+use request::{MAX_PIXELS, ServedQuestion};
 
 /// Maximum number of bytes of all bodies in flight (chosen). A body takes up to three times its size until it is decoded.
 const MAX_BODIES: usize = 2 * MAX_BODY;
-/// Maximum number of pixels of an image, and of all images in flight (chosen). Decoded and encoded again, a pixel takes 10 to 20 bytes.
-const MAX_PIXELS: usize = 32_000_000;
-
 /// Maximum number of requests answered in parallel; further ones wait (chosen).
 const MAX_PARALLEL: usize = 16;
 

@@ -8,12 +8,14 @@ use hyper::StatusCode;
 use serde::Deserialize;
 use tokio::sync::OwnedSemaphorePermit;
 
-use super::MAX_PIXELS;
 use super::completion::{ReplyForm, RequestFault};
 use super::memory::MemoryBound;
 use crate::picture::{DecodeRule, ImageFile};
 use crate::picture::{Payload, PayloadFormat};
 use crate::types::Rgb;
+
+/// Maximum number of pixels of an image, and of all images in flight (chosen). Decoded and encoded again, a pixel takes 10 to 20 bytes.
+pub(super) const MAX_PIXELS: usize = 32_000_000;
 
 /// The used fields of a request. Other fields are ignored.
 #[derive(Deserialize)]

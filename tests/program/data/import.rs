@@ -585,7 +585,8 @@ fn depth_of_0_to_1_needs_its_unit() {
         assert_eq!(sides(frame(&set, "home/0").depth.as_ref()), sides_of_map);
     }
     // One value above 1 shows metres.
-    let metres = normalised_depth(1.2).import("folder", &["--labels", "nyu40"]);
+    let scene = normalised_depth(1.2);
+    let metres = scene.import("folder", &["--labels", "nyu40"]);
     assert_eq!(sides(frame(&metres, "home/0").depth.as_ref()), (350, 1_200));
 }
 

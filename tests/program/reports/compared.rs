@@ -82,9 +82,19 @@ impl Scene {
     /// The lines above the report of runs.
     pub(crate) fn alerts(&self, line: &str) -> Vec<String> {
         let text = self.bench.complete(&words(&format!("{line} --full")));
-        // Below the head.
-        let lines = text.lines().skip(1);
-        let lines = lines.map_while(|line| line.strip_prefix("! "));
+        // Below the head. A long alert goes on in indented lines.
+        let mut lines: Vec<String> = Vec::new();
+        for line in text.lines().skip(1) {
+            match (
+                line.strip_prefix("! "),
+                line.strip_prefix("  "),
+                lines.last_mut(),
+            ) {
+                (Some(alert), ..) => lines.push(alert.to_owned()),
+                (None, Some(rest), Some(alert)) => *alert += &format!(" {rest}"),
+                _ => break,
+            }
+        }
         // The enhancer and the frames are made for tests, the scripted model answers one letter, and nearly all of these runs have the
         // noise of the default reading.
         let of_all = [
@@ -92,10 +102,8 @@ impl Scene {
             "whatever the image",
             "signal-to-noise ratio is the same",
         ];
+        lines.retain(|line| of_all.iter().all(|part| !line.contains(part)));
         lines
-            .filter(|line| of_all.iter().all(|part| !line.contains(part)))
-            .map(str::to_owned)
-            .collect()
     }
 
     pub(crate) fn csv(&self, path: &str) -> Vec<Vec<String>> {

@@ -449,10 +449,8 @@ fn enhanced_walks_use_batch_and_page() {
     let called = house.call(&words(&line));
     insta::assert_snapshot!(called.lines_with("bright"), @"
     exit code: 0
-    ! bright was used because of --allow bad-enhancer although its images may be read in a wrong way: on 4 of 6
-        dark frames its images are flat (brightness varies by 0.0 of 255). No usual value range fits (0..1,
-        0..255, -1..1, -0.5..0.5, mean and std of ImageNet or CLIP); perhaps it needs another `mean` and `std`,
-        another output is the image, or the export has lost its weights.
+    ! bright: 0..1 assumed. Neither sidecar nor preset states its value ranges, and its images of dark frames are
+        plausible with 0..1.
      m       with noise + bright          75.0 (0.0)   3 of 3   −28.2 +16.1
      m       with noise + bright   hm3d-v0                        75.0 (0.0)   −57.6 +22.7
     ");

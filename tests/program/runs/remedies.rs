@@ -158,8 +158,8 @@ fn rows() -> Vec<Row> {
                     .or_else(|| {
                         when(
                             answered == 5 && failed.fetch_add(1, Ordering::SeqCst) == 0,
-                            400,
-                            "odd",
+                            413,
+                            "too large",
                         )
                     })
                 })

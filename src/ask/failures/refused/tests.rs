@@ -31,8 +31,8 @@ fn statuses_are_classified() {
     for status in [301, 302, 307, 401, 402, 403, 404, 405, 407, 410] {
         let class = classify(status, "");
         let reach = match status {
-            300..400 | 407 => Reach::Endpoint,
-            _ => Reach::ByStatus,
+            403 | 404 | 410 => Reach::ByStatus,
+            _ => Reach::Endpoint,
         };
         assert_eq!(
             (class.reach, class.retry),
