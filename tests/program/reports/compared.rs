@@ -91,7 +91,7 @@ impl Scene {
                 lines.last_mut(),
             ) {
                 (Some(alert), ..) => lines.push(alert.to_owned()),
-                (None, Some(rest), Some(alert)) => *alert += &format!(" {rest}"),
+                (None, Some(rest), Some(alert)) => alert.extend([" ", rest]),
                 _ => break,
             }
         }
