@@ -286,8 +286,6 @@ impl Endpoint {
                 failed_over = Some(failed);
                 continue;
             }
-            let is_charged_often =
-                request.paid_before + attempts.charged() > self.sending.paid_retries;
             if is_charged_often && !failed.lost.is_none() {
                 return Err(attempts.give_up(failed, request.timeouts.remedy));
             }
@@ -476,11 +474,6 @@ impl Endpoint {
     /// Waits before a question is asked again whose reply does not count, at most until the endpoint is closed.
     pub(in crate::ask) async fn wait_to_ask_again(&self) {
         self.sleep_unless_closed(self.sending.first_delay).await;
-    }
-
-    /// True if a question may be asked again after this many charged attempts without a reply that counts.
-    pub(in crate::ask) fn may_pay_again(&self, paid: u32) -> bool {
-        paid <= self.sending.paid_retries
     }
 
     /// Sleeps for a time, at most until the endpoint is closed.

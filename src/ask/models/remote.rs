@@ -243,7 +243,7 @@ impl Remote {
         before: AskedBefore,
     ) -> Result<Reply, AskError> {
         let first = self
-            .ask_adapting(message, choices, 0, reservation, before)
+            .ask_adapting(message, choices, reservation, before)
             .await?;
         self.has_answered.store(true, Ordering::Relaxed);
         if !first.may_heal {
@@ -251,23 +251,22 @@ impl Remote {
         }
         let mut lost = first.lost;
         lost.add(first.usage);
-        let may_pay = self.endpoint.may_pay_again(lost.attempts);
+        let may_pay = lost.attempts <= self.endpoint.paid_retries();
+        let before = before.with_charged(lost.attempts);
         self.finish_words
             .settle(first, may_pay, || async {
                 self.endpoint.wait_to_ask_again().await;
-                self.ask_adapting(message, choices, lost.attempts, reservation, before)
+                self.ask_adapting(message, choices, reservation, before)
                     .await
             })
             .await
     }
 
-    /// Asks a question, and again after each adaptation of a refused field, or as a stream after a gateway timeout. `paid` is the number of
-    /// its earlier charged attempts.
+    /// Asks a question, and again after each adaptation of a refused field, or as a stream after a gateway timeout.
     async fn ask_adapting(
         &self,
         message: Message<'_>,
         choices: usize,
-        paid: u32,
         reservation: Option<&Reservation>,
         mut before: AskedBefore,
     ) -> Result<Reply, AskError> {
@@ -281,7 +280,7 @@ impl Remote {
                 .after_timeout(&self.parameters, wire, before, paid_retries);
             let sent = RequestFields { wire, ..fields };
             let outcome = self
-                .ask_with(sent, timeouts, message, choices, paid, reservation)
+                .ask_with(sent, timeouts, message, choices, reservation)
                 .await;
             if let Err(error) = &outcome {
                 let mut forced = self.forced.lock().unwrap_or_else(PoisonError::into_inner);
@@ -356,7 +355,6 @@ impl Remote {
         timeouts: AfterTimeout,
         message: Message<'_>,
         choices: usize,
-        paid_before: u32,
         reservation: Option<&Reservation>,
     ) -> Result<Reply, AskError> {
         let parameters = &self.parameters;
@@ -383,7 +381,6 @@ impl Remote {
             },
             affinity: image_hash(message),
             timeouts,
-            paid_before,
             reservation,
         };
         self.endpoint.ask(&request).await

@@ -34,7 +34,7 @@ pub(super) struct StreamFallback {
 /// How one question is asked after gateway timeouts.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct AskedBefore {
-    /// Number of requests of the question that were probably charged.
+    /// Number of requests of the question that were charged, certainly or probably, and gave no reply that counts.
     charged: u32,
     /// True to ask for a stream, if that is possible.
     as_stream: bool,
@@ -49,6 +49,14 @@ impl AskedBefore {
             charged: paid_retries,
             as_stream: true,
             is_too_long: false,
+        }
+    }
+
+    /// The same question after more charged requests.
+    pub(super) fn with_charged(self, more: u32) -> Self {
+        Self {
+            charged: self.charged + more,
+            ..self
         }
     }
 

@@ -11,7 +11,7 @@ use crate::ask::wire_kind::Wire;
 /// What follows if a gateway gives up on a request.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::ask) struct AfterTimeout {
-    /// Number of earlier requests of the question that were probably charged.
+    /// Number of earlier requests of the question that were charged, certainly or probably, and gave no reply that counts.
     pub(in crate::ask) charged: u32,
     /// True if the caller asks the question in another way, so that the request is not repeated.
     pub(in crate::ask) asks_otherwise: bool,
@@ -32,8 +32,6 @@ pub(in crate::ask) struct Request<'a> {
     pub(in crate::ask) affinity: u64,
     /// Handling of gateway timeouts.
     pub(in crate::ask) timeouts: AfterTimeout,
-    /// Number of earlier attempts at the question that were charged and gave no reply that counts.
-    pub(in crate::ask) paid_before: u32,
     /// Reservation of the cost of each attempt; `None` if the model has no known price.
     pub(in crate::ask) reservation: Option<&'a Reservation>,
 }

@@ -148,6 +148,21 @@ fn broken_generations_are_asked_again() {
     });
 }
 
+/// The server has worked twice then, so that there is no third request.
+#[test]
+fn second_try_that_a_gateway_cuts_is_the_last() {
+    let mock = endpoint(|times| match times {
+        0 => ended("zeitgeist", ""),
+        _ => Answer::error(524, "timeout", "A timeout occurred"),
+    });
+    let run = run(&mock, "");
+    assert_eq!(run.failed, ENDED.len(), "{:?}", run.called);
+    for (question, requests) in run.requests.iter().enumerate() {
+        let expected = 1 + usize::from(ENDED.contains(&question));
+        assert_eq!(*requests, expected, "{question}: {:?}", run.called);
+    }
+}
+
 #[test]
 fn refusal_that_heals_is_answered() {
     let mock = endpoint(|times| match times {
