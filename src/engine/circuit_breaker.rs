@@ -18,10 +18,6 @@ const FAILURES_IN_A_ROW: usize = 20;
 /// trials about it are set aside after as many.
 const MAX_FAILURES_PER_SOURCE: usize = 2;
 
-/// Number of refusals in a row by a status of the key, the credit or the address, in words that name no cause, after which a model that has
-/// succeeded before is stopped. Chosen: a gateway sends one by mistake, and they cost nothing.
-const REFUSALS_IN_A_ROW: usize = 3;
-
 /// Minimum number of frames or walks of refusals in a row that may concern the content, for a model to be stopped; chosen.
 const MIN_REFUSED_SOURCES: usize = 3;
 
@@ -88,14 +84,10 @@ impl ModelHealth {
     /// True if every further request would be refused, as far as the refusals of this kind show: the model has answered nothing, or has
     /// stopped answering.
     fn is_refused(&self, error: &AskError) -> bool {
+        // The content of a frame or two may be the cause.
         let is_by_status = error.reach == Reach::ByStatus
-            && if error.refusal.is_some() {
-                // The content of a frame or two may be the cause.
-                self.status_refusals >= FAILURES_AT_START
-                    && self.status_sources.len() >= MIN_REFUSED_SOURCES
-            } else {
-                self.status_refusals >= REFUSALS_IN_A_ROW
-            };
+            && self.status_refusals >= FAILURES_AT_START
+            && self.status_sources.len() >= MIN_REFUSED_SOURCES;
         let is_first =
             !self.succeeded && self.refusals >= FAILURES_AT_START && self.refused_sources.len() > 1;
         is_by_status || is_first

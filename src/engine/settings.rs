@@ -378,10 +378,7 @@ impl RunPlace {
         Continuation {
             columns: self.read_or_default(store::read_columns),
             settings: self.settings(),
-            folder: match self {
-                Self::Named(folder) | Self::Resume(folder) => Some(folder.clone()),
-                Self::Automatic => None,
-            },
+            folder: self.folder().map(Path::to_owned),
         }
     }
 

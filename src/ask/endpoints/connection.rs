@@ -183,16 +183,16 @@ impl Connection {
     ) -> Result<HttpResponse, AskError> {
         let keyed = self.key.add_to(headers);
         let response = self.post_once(path, &keyed.headers, body, deadline).await?;
-        if !self.has_new_key(&response, &keyed) {
+        if !self.has_new_key(response.status, &keyed) {
             return Ok(response);
         }
         let keyed = self.key.add_to(headers);
         self.post_once(path, &keyed.headers, body, deadline).await
     }
 
-    /// True if a response refuses the key of its request, and the file of the key has another one.
-    fn has_new_key(&self, response: &HttpResponse, keyed: &KeyedHeaders) -> bool {
-        response.status == StatusCode::UNAUTHORIZED && self.key.renew(keyed)
+    /// True if a response with this status refuses the key of its request, and the file of the key has another one.
+    fn has_new_key(&self, status: StatusCode, keyed: &KeyedHeaders) -> bool {
+        status == StatusCode::UNAUTHORIZED && self.key.renew(keyed)
     }
 
     async fn post_once(
@@ -248,7 +248,7 @@ impl Connection {
         let request = request.headers(keyed.headers.clone());
         let response = self.exchange(request, deadline).await?;
         match again {
-            Some(again) if self.has_new_key(&response, &keyed) => {
+            Some(again) if self.has_new_key(response.status, &keyed) => {
                 let keyed = self.key.add_to(headers);
                 self.exchange(again.headers(keyed.headers), deadline).await
             }
@@ -342,8 +342,7 @@ impl Connection {
         let request = request.headers(keyed.headers.clone());
         let mut response = self.run_step(&mut timer, request.send()).await?;
         if let Some(again) = again
-            && response.status() == StatusCode::UNAUTHORIZED
-            && self.key.renew(&keyed)
+            && self.has_new_key(response.status(), &keyed)
         {
             let again = again.headers(self.key.add_to(headers).headers);
             response = self.run_step(&mut timer, again.send()).await?;

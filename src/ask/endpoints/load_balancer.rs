@@ -280,7 +280,7 @@ impl LoadBalancer {
             let model = &mut models[model.0];
             let refusals = model.refusals.entry(index).or_default();
             *refusals += 1;
-            if failed.refusal.is_some() && *refusals < MAX_REFUSALS {
+            if failed.reach == Reach::ByStatus && *refusals < MAX_REFUSALS {
                 // The request may be the cause: another replica shows it.
                 return Failover::to_other_replica_if(model.excluded.len() + 1 < replicas.len());
             }

@@ -209,9 +209,9 @@ impl Replica {
         sent: Instant,
     ) -> AskError {
         let now = SystemTime::now();
-        let api_error = &mut api_error.clone();
+        let mut api_error = api_error.clone();
         api_error.wait = retry_after(&response.headers, now).max(api_error.wait);
-        let api_error = &*api_error;
+        let api_error = &api_error;
         let mut failed = AskError::refused(status, api_error, request.wire, request.sent);
         // A limit of requests is one, whatever the status.
         let pace_status = match failed.failure.kind {

@@ -7,7 +7,6 @@ use regex::Regex;
 use serde_json::Value;
 
 use super::structured_error::find_error;
-use super::vocabulary;
 use crate::ask::pace::{wait_in_field, wait_in_words};
 use crate::ask::replies::bounded_json::{parse, parse_start};
 use crate::types::Usage;
@@ -271,21 +270,6 @@ impl ApiError {
             .chain([&self.message])
             .map(|text| text.to_lowercase())
             .collect()
-    }
-
-    /// The HTTP status that fits the words of an error in a response with a success status and without a code; 500 if none does.
-    pub(in crate::ask) fn likely_status(&self) -> u16 {
-        let is_credit =
-            self.has_code_like(&vocabulary::CREDIT_CODES) || self.mentions_any(&vocabulary::CREDIT);
-        if is_credit {
-            402
-        } else if self.mentions_any(&vocabulary::RATE) {
-            429
-        } else if self.mentions_any(&vocabulary::WRONG_KEY) {
-            401
-        } else {
-            500
-        }
     }
 
     /// The error code as an HTTP status; `None` unless it is a number from 400 to 599.

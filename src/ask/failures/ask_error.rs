@@ -15,8 +15,8 @@ pub enum Reach {
     Trial,
     /// Every request of this size. Before the first reply of the model: every further request to it.
     Alike,
-    /// Every further request to this model by the meaning of the status alone (403, 404 …): the server's words name no such cause, so that
-    /// it may be this request. The run stops once several were refused in a row.
+    /// Every further request to this model by the meaning of the status alone (403, 404, 410): the server's words name no such cause, so
+    /// that it may be this request. The run stops once several were refused in a row.
     ByStatus,
     /// Every further request to this model: the cause is the key, the credit, the address, the name or the parameters.
     Endpoint,
@@ -193,8 +193,7 @@ impl AskError {
     pub(in crate::ask) fn may_be_content(&self, status: u16) -> bool {
         let is_unexplained = match self.reach {
             Reach::Trial => self.failure.message.is_empty(),
-            // 401, 402, 405 and 407 speak of the key, the credit, the address or the proxy.
-            Reach::ByStatus => matches!(status, 403 | 404 | 410),
+            Reach::ByStatus => true,
             _ => false,
         };
         let is_refused = self.failure.kind == FailureKind::Request

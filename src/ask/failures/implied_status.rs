@@ -2,6 +2,7 @@
 
 use super::api_error::ApiError;
 use super::moderation::{is_moderated, is_out_of_tokens};
+use super::vocabulary;
 
 /// The HTTP status that an error implies which came with a success status: its code, or what its words mean. Without either it is a
 /// failure of the server, which may pass.
@@ -9,10 +10,18 @@ pub(in crate::ask) fn implied_status(api_error: &ApiError) -> u16 {
     if let Some(status) = api_error.status() {
         return status;
     }
+    let is_credit = api_error.has_code_like(&vocabulary::CREDIT_CODES)
+        || api_error.mentions_any(&vocabulary::CREDIT);
     if is_moderated(400, api_error) || is_out_of_tokens(400, api_error) {
         400
+    } else if is_credit {
+        402
+    } else if api_error.mentions_any(&vocabulary::RATE) {
+        429
+    } else if api_error.mentions_any(&vocabulary::WRONG_KEY) {
+        401
     } else {
-        api_error.likely_status()
+        500
     }
 }
 

@@ -75,17 +75,9 @@ const USED_UP: [&str; 4] = [
 /// True if moderation rejected the content of a request, as opposed to its key or its fields: the same request is rejected again.
 pub(in crate::ask) fn is_moderated(status: u16, api_error: &ApiError) -> bool {
     api_error.is_moderated
-        || has_code_part(api_error)
+        || api_error.has_code_like(&CODES)
         || api_error.mentions_any(&PHRASES)
         || (status == 403 && api_error.mentions_any(&PHRASES_OF_403))
-}
-
-fn has_code_part(api_error: &ApiError) -> bool {
-    [&api_error.code, &api_error.kind]
-        .into_iter()
-        .flatten()
-        .map(|code| code.to_lowercase().replace(['_', '-', ' ', '.'], ""))
-        .any(|code| CODES.iter().any(|part| code.contains(part)))
 }
 
 /// True if the server generated up to the token limit and sent an error instead of the truncated reply (Azure: "Could not finish the

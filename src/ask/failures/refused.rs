@@ -48,6 +48,9 @@ const CHECK_KEY: &str = "check the key; it is taken from OPENAI_API_KEY (for Azu
 /// Remedy for a key that lacks a right.
 const CHECK_RIGHT: &str = "the key may not use this model from here: check the key and --model";
 
+/// Remedy for an address or a model that the server does not have.
+const CHECK_ADDRESS: &str = "check --base-url (many end with /v1) and --model";
+
 /// Remedy for a model that the server does not have.
 const CHECK_MODEL: &str = "the server knows no model of this name: check --model and --base-url";
 
@@ -135,6 +138,9 @@ impl AskError {
                 ..Self::permanent(&wording.hint())
             });
         }
+        if is_refusal && !matches!(status, 401 | 407 | 429) && is_moderated(status, api_error) {
+            return Some(Self::new(FailureKind::Filtered, String::new()));
+        }
         if matches!(status, 400 | 403 | 404 | 406 | 410 | 422)
             || (status == 405 && api_error.page.is_some())
         {
@@ -167,9 +173,6 @@ impl AskError {
         sent: SentFields<'_>,
     ) -> Option<Self> {
         let mentions = |words: &[&str]| api_error.mentions_any(words);
-        if is_moderated(status, api_error) {
-            return Some(Self::new(FailureKind::Filtered, String::new()));
-        }
         let field = Self::from_field(api_error, &wire.fields(sent));
         if field.reach == Reach::Endpoint {
             return Some(field);
@@ -211,9 +214,9 @@ impl AskError {
     /// Classifies a refusal whose words do not decide, by its status.
     fn by_status(status: u16, api_error: &ApiError, wire: Wire, sent: SentFields<'_>) -> Self {
         let says_nothing = api_error.message.is_empty();
-        let mentions = |words: &[&str]| says_nothing || api_error.mentions_any(words);
+        let mentions = |words: &[&str]| api_error.mentions_any(words);
         match status {
-            300..400 => {
+            300..=399 => {
                 Self::permanent("redirects are not followed: give the final address as --base-url")
             }
             401 if !sent.has_key => Self::permanent(
@@ -223,30 +226,21 @@ impl AskError {
             407 => Self::permanent(
                 "the proxy asks for a user and password: set them in HTTP_PROXY, or name the host in NO_PROXY",
             ),
-            400..429 | 430..500 if is_moderated(status, api_error) => {
-                Self::new(FailureKind::Filtered, String::new())
-            }
             402 => Self::permanent(PAY),
-            403 if (says_nothing || !api_error.mentions_any(&vocabulary::CONTENT))
-                && (mentions(&vocabulary::WRONG_KEY)
-                    || mentions(&vocabulary::NO_RIGHT)
-                    || mentions(&vocabulary::MODEL)) =>
-            {
-                Self::permanent_if(
-                    !says_nothing && mentions(&vocabulary::WRONG_KEY),
-                    CHECK_RIGHT,
-                )
+            403 if says_nothing => Self::of_status(CHECK_RIGHT),
+            403 if mentions(&vocabulary::CONTENT) => Self::of_status(""),
+            403 if mentions(&vocabulary::WRONG_KEY) => Self::permanent(CHECK_RIGHT),
+            403 if mentions(&vocabulary::NO_RIGHT) || mentions(&vocabulary::MODEL) => {
+                Self::of_status(CHECK_RIGHT)
             }
+            404 | 410 if says_nothing => Self::of_status(CHECK_ADDRESS),
             404 | 410
                 if api_error.page.is_some()
                     || mentions(&vocabulary::MODEL)
                     || mentions(&vocabulary::PATH)
                     || api_error.names(&sent.parameters.model) =>
             {
-                Self::permanent_if(
-                    !says_nothing,
-                    "check --base-url (many end with /v1) and --model",
-                )
+                Self::permanent(CHECK_ADDRESS)
             }
             // The words say something else, which may concern this request alone.
             403 | 404 | 410 => Self::of_status(""),
@@ -306,15 +300,6 @@ impl AskError {
         Self {
             reach: Reach::Endpoint,
             ..Self::new(FailureKind::Request, hint.to_owned())
-        }
-    }
-
-    /// Error that every other request would have too: by the server's words, or by its status alone.
-    fn permanent_if(has_words: bool, hint: &str) -> Self {
-        if has_words {
-            Self::permanent(hint)
-        } else {
-            Self::of_status(hint)
         }
     }
 

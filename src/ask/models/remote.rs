@@ -216,18 +216,16 @@ impl Remote {
     }
 
     /// Decides which requests a failure affects. Before the first reply, [`Reach::Alike`] becomes `alike`; and [`Reach::ByStatus`] is
-    /// every request, if the status speaks of the key, the credit or the address, or if `refused` earlier questions make it
-    /// [`REFUSALS_AT_START`]. After the first reply, such a status may concern one question.
+    /// every request, if `refused` earlier questions make it [`REFUSALS_AT_START`]. After the first reply, such a status may concern one
+    /// question.
     fn resolve_reach(&self, error: AskError, alike: Reach, refused: usize) -> AskError {
         let reach = match error.reach {
             Reach::Alike => alike,
-            Reach::ByStatus if !self.has_answered.load(Ordering::Relaxed) => {
-                // A refusal that may concern the content has its words.
-                if error.refusal.is_none() || refused + 1 >= REFUSALS_AT_START {
-                    Reach::Endpoint
-                } else {
-                    Reach::ByStatus
-                }
+            Reach::ByStatus
+                if !self.has_answered.load(Ordering::Relaxed)
+                    && refused + 1 >= REFUSALS_AT_START =>
+            {
+                Reach::Endpoint
             }
             reach => reach,
         };

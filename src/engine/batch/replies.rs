@@ -177,25 +177,19 @@ impl<'a, D: Detail> ReplyImport<'a, D> {
                 (failure.kind == FailureKind::Request).then_some((record.key, failure.message))
             })
             .collect();
-        for key in content {
-            let is_same =
-                |failed: &&FailedTrial<D>| earlier.get(key) == Some(&failed.failure.message);
-            if self
-                .failures
-                .get(key)
-                .as_ref()
-                .is_none_or(|failed| !is_same(failed))
-            {
+        for (key, message) in earlier {
+            let failed = self.failures.get(&key);
+            if failed.is_none_or(|failed| failed.failure.message != message) {
                 continue;
             }
-            if let Some(FailedTrial { blank, failure, .. }) = self.failures.remove(key) {
+            if let Some(FailedTrial { blank, failure, .. }) = self.failures.remove(&key) {
                 let reply = Reply {
                     refusal: Some(refusal_words(&failure)),
                     finish: Finish::Filter,
                     lost: blank.lost,
                     ..Reply::local(String::new())
                 };
-                self.waiting.remove(key);
+                self.waiting.remove(&key);
                 self.counts.answered += 1;
                 self.store.append(&answered(blank, reply)?)?;
             }
