@@ -10,7 +10,7 @@ use super::requests::Constrain;
 use super::requests::constraint::constrained_letter;
 use super::secrets::{Scrub, without_secrets};
 use super::wire::{batch_reply, body_usage};
-use crate::types::{Failure, FailureKind, Finish, LostAttempts, Reply, Usage};
+use crate::types::{Failure, FailureKind, LostAttempts, Reply, Usage};
 
 /// Writes a line of an input file, with a line end: `{"custom_id", "method", "url", "body"}`, with the body of a single request.
 pub(super) fn input_line(id: &str, url: &str, body: &[u8]) -> Result<Vec<u8>, serde_json::Error> {
@@ -110,17 +110,11 @@ fn result(line: &Value, scrub: &Scrub) -> Result<Reply, Failure> {
         let code = api_error.code.as_deref().map(|code| scrub.line(code));
         let mut lost = LostAttempts::default();
         if is_out_of_tokens(status, api_error) {
-            return Some(Reply {
-                finish: Finish::Length,
-                usage,
-                ..Reply::local(String::new())
-            });
+            return Some(Reply::empty_truncated(usage));
         }
         lost.add(usage);
-        let is_filtered = (400..500).contains(&status)
-            && !matches!(status, 401 | 407 | 429)
-            && is_moderated(status, api_error);
-        is_filtered.then(|| Refusal::new(status, code.as_deref(), words).into_reply(1, lost))
+        is_moderated(status, api_error)
+            .then(|| Refusal::new(status, code.as_deref(), words).into_reply(1, lost))
     };
     let fail = |kind, text: &str| {
         let text = scrub.line(text);
@@ -189,6 +183,7 @@ pub(crate) fn with_letter(reply: Reply, constrain: Constrain, choices: usize) ->
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::types::Finish;
 
     /// A known key is removed from every recorded text; an unknown one is not.
     #[test]

@@ -777,20 +777,19 @@ pub fn light_beside() -> Graph {
 
 /// An enhancer that takes values with a mean and a deviation for each channel.
 pub fn normalised(mean: [f32; 3], std: [f32; 3]) -> Graph {
-    Graph::new()
-        .constant("mean", &[1, 3, 1, 1], &mean)
-        .constant("std", &[1, 3, 1, 1], &std)
-        .constant("zero", &[], &[0.0])
-        .constant("exponent", &[], &[0.4])
-        .node("Mul", &["input", "std"], "scaled")
-        .node("Add", &["scaled", "mean"], "unit")
-        .node("Max", &["unit", "zero"], "light")
-        .node("Pow", &["light", "exponent"], "output")
-        .giving_image()
+    brightened_from_normalised(mean, std, "output").giving_image()
 }
 
 /// An enhancer that takes and gives values with a mean and a deviation for each channel.
 pub fn normalised_at_both_ends(mean: [f32; 3], std: [f32; 3]) -> Graph {
+    brightened_from_normalised(mean, std, "enhanced")
+        .node("Sub", &["enhanced", "mean"], "centred")
+        .node("Div", &["centred", "std"], "output")
+        .giving_image()
+}
+
+/// Nodes that take values with a mean and a deviation for each channel, and give the brightened values in [0, 1] under a name.
+fn brightened_from_normalised(mean: [f32; 3], std: [f32; 3], output: &str) -> Graph {
     Graph::new()
         .constant("mean", &[1, 3, 1, 1], &mean)
         .constant("std", &[1, 3, 1, 1], &std)
@@ -799,10 +798,7 @@ pub fn normalised_at_both_ends(mean: [f32; 3], std: [f32; 3]) -> Graph {
         .node("Mul", &["input", "std"], "scaled")
         .node("Add", &["scaled", "mean"], "unit")
         .node("Max", &["unit", "zero"], "light")
-        .node("Pow", &["light", "exponent"], "enhanced")
-        .node("Sub", &["enhanced", "mean"], "centred")
-        .node("Div", &["centred", "std"], "output")
-        .giving_image()
+        .node("Pow", &["light", "exponent"], output)
 }
 
 /// An image whose brightness follows from the last bits of a product over all pixels: of the 3 channels with 24 copies of them.

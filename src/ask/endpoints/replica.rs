@@ -22,7 +22,7 @@ use crate::ask::vendors::Vendor;
 use crate::ask::wire::{body_usage, cost_in_headers, with_cost};
 use crate::ask::wire_kind::Wire;
 use crate::error::Result;
-use crate::types::{FailureKind, Finish, Reply, Usage};
+use crate::types::{FailureKind, Reply};
 
 /// One address of an endpoint, with its key, pooled connections, rate limiter and concurrency window.
 #[derive(Debug)]
@@ -194,7 +194,7 @@ impl Replica {
     ) -> Result<Reply, AskError> {
         if is_out_of_tokens(status, api_error) {
             let usage = body_usage(&String::from_utf8_lossy(&response.body));
-            return Ok(self.finish_reply(empty_truncated(usage), response, request, sent));
+            return Ok(self.finish_reply(Reply::empty_truncated(usage), response, request, sent));
         }
         Err(self.refusal(status, api_error, response, request, sent))
     }
@@ -334,16 +334,7 @@ impl Replica {
 fn truncated_reply(unreadable: &Unreadable, limit: Option<u32>) -> Option<Reply> {
     let tokens = unreadable.usage?.completion_tokens?;
     let is_truncated = unreadable.finish.is_none() && tokens >= u64::from(limit?);
-    is_truncated.then(|| empty_truncated(unreadable.usage))
-}
-
-/// A reply without text that ended at the token limit.
-fn empty_truncated(usage: Option<Usage>) -> Reply {
-    Reply {
-        finish: Finish::Length,
-        usage,
-        ..Reply::local(String::new())
-    }
+    is_truncated.then(|| Reply::empty_truncated(unreadable.usage))
 }
 
 /// True for a server error by which the request was rejected before any work on it.

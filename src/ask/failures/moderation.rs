@@ -73,11 +73,16 @@ const USED_UP: [&str; 4] = [
 ];
 
 /// True if moderation rejected the content of a request, as opposed to its key or its fields: the same request is rejected again.
+/// Statuses of a key, a proxy and a rate are not about content, whatever the words.
 pub(in crate::ask) fn is_moderated(status: u16, api_error: &ApiError) -> bool {
-    api_error.is_moderated
-        || api_error.has_code_like(&CODES)
-        || api_error.mentions_any(&PHRASES)
-        || (status == 403 && api_error.mentions_any(&PHRASES_OF_403))
+    let may_be_content = (400..500).contains(&status) && !matches!(status, 401 | 407 | 429);
+    let is_stated = || {
+        api_error.is_moderated
+            || api_error.has_code_like(&CODES)
+            || api_error.mentions_any(&PHRASES)
+            || (status == 403 && api_error.mentions_any(&PHRASES_OF_403))
+    };
+    may_be_content && is_stated()
 }
 
 /// True if the server generated up to the token limit and sent an error instead of the truncated reply (Azure: "Could not finish the
@@ -134,6 +139,8 @@ mod tests {
             (400, "unknown_parameter", "Unrecognized argument: flagged"),
             (403, "x", "the key may not use this model"),
             (404, "model_not_found", "no such model"),
+            (429, "content_filter", "x"),
+            (500, "content_filter", "x"),
         ] {
             assert!(!is_moderated(status, &error(code, message)), "{message}");
         }

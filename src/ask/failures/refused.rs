@@ -138,7 +138,7 @@ impl AskError {
                 ..Self::permanent(&wording.hint())
             });
         }
-        if is_refusal && !matches!(status, 401 | 407 | 429) && is_moderated(status, api_error) {
+        if is_moderated(status, api_error) {
             return Some(Self::new(FailureKind::Filtered, String::new()));
         }
         if matches!(status, 400 | 403 | 404 | 406 | 410 | 422)

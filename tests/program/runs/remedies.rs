@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use crate::support::endpoint::{Answer, MockEndpoint, Request};
 use crate::support::house::House;
-use crate::support::run::{Bench, model_args, records, words};
+use crate::support::run::{Bench, Called, model_args, records, words};
 use crate::support::table::check_rows_at_once;
 
 /// Number of questions of each run.
@@ -432,7 +432,7 @@ fn changed_limits_ask_truncated_replies_again() {
 }
 
 /// A server for open questions whose judge has rules of its own.
-fn of_judge(house: &House, server: &Server, flags: &str) -> crate::support::run::Called {
+fn of_judge(house: &House, server: &Server, flags: &str) -> Called {
     let base = server.mock.base_url();
     house.call(&words(&format!(
         "--model m --judge j --base-url {base} --levels L0 --out run --concurrency 1 --retries 0 {flags}"
@@ -446,6 +446,20 @@ fn sent(server: &Server, model: &str) -> Vec<Value> {
         .map(Request::json)
         .filter(|body| body["model"] == model)
         .collect()
+}
+
+/// Checks that the first command fails and prints the remedy, and that the second, in the same folder, succeeds and asks no answer again.
+fn check_judge_remedy(server: &Server, flags: [&str; 2], remedy: &str) {
+    let house = House::new();
+    let [first, second] = flags;
+    let first = of_judge(&house, server, first);
+    assert_ne!(first.code, Some(0), "{first:?}");
+    let printed = format!("{}{}", first.stdout, first.stderr);
+    assert!(printed.contains(remedy), "{printed}");
+    let answers = sent(server, "m").len();
+    let second = of_judge(&house, server, second);
+    assert_eq!(second.code, Some(0), "{second:?}");
+    assert_eq!(sent(server, "m").len(), answers, "answers were asked again");
 }
 
 #[test]
@@ -472,7 +486,6 @@ fn default_temperature_of_the_judge_is_adapted() {
     );
     assert_eq!(sent(&server, "j").last().unwrap().get("temperature"), None);
     // A temperature of the user is the user's to change: by the judge's flag, in the same folder.
-    let house = House::new();
     let server = Server::new(|_, body| {
         let is_refused = body["model"] == "j" && body["temperature"] != 1.0;
         when(
@@ -481,18 +494,8 @@ fn default_temperature_of_the_judge_is_adapted() {
             "invalid temperature: only 1 is allowed for this model",
         )
     });
-    let first = of_judge(&house, &server, "--judge-temperature 0.5");
-    assert_ne!(first.code, Some(0));
-    let printed = format!("{}{}", first.stdout, first.stderr);
-    assert!(printed.contains("--judge-temperature default"), "{printed}");
-    let answers = sent(&server, "m").len();
-    let second = of_judge(&house, &server, "--judge-temperature 1");
-    assert_eq!(second.code, Some(0), "{second:?}");
-    assert_eq!(
-        sent(&server, "m").len(),
-        answers,
-        "answers were asked again"
-    );
+    let flags = ["--judge-temperature 0.5", "--judge-temperature 1"];
+    check_judge_remedy(&server, flags, "--judge-temperature default");
 }
 
 #[test]
@@ -519,7 +522,6 @@ fn default_seed_is_adapted_and_a_seed_of_the_user_is_named() {
 
 #[test]
 fn credit_of_the_judge_is_told_by_its_own_flag() {
-    let house = House::new();
     let server = Server::new(|_, body| {
         when(
             body["model"] == "j" && tokens(body) > 20,
@@ -527,17 +529,8 @@ fn credit_of_the_judge_is_told_by_its_own_flag() {
             "You can only afford 20",
         )
     });
-    let first = of_judge(&house, &server, "");
-    let printed = format!("{}{}", first.stdout, first.stderr);
-    assert!(printed.contains("--judge-max-tokens 20"), "{printed}");
-    let answers = sent(&server, "m").len();
-    let second = of_judge(&house, &server, "--judge-max-tokens 20");
-    assert_eq!(second.code, Some(0), "{second:?}");
-    assert_eq!(
-        sent(&server, "m").len(),
-        answers,
-        "answers were asked again"
-    );
+    let flags = ["", "--judge-max-tokens 20"];
+    check_judge_remedy(&server, flags, "--judge-max-tokens 20");
 }
 
 /// The least temperature that a server takes is sent, and nothing if that is refused, too.

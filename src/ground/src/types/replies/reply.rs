@@ -272,4 +272,14 @@ impl Reply {
             other_field: None,
         }
     }
+
+    /// A reply without text that ended at the token limit, from a server that sent none of the text.
+    #[must_use]
+    pub fn empty_truncated(usage: Option<Usage>) -> Self {
+        Self {
+            finish: Finish::Length,
+            usage,
+            ..Self::local(String::new())
+        }
+    }
 }
