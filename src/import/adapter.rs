@@ -21,8 +21,8 @@ pub(crate) struct MapArgs {
     /// classes.json; default: that of the kind of data set
     #[arg(long, value_name = "NAME|FILE", add = Decides::Pixels)]
     pub labels: Option<String>,
-    /// The metres in one unit of depth: 0.001 for millimetres, 0.0002 for 1/5000 m, 10 for habitat-lab's 0..1 of 10 m; default: that
-    /// of the kind of data set, 1 for floats in .npy and HDF5
+    /// The metres in one unit of depth: 0.001 for millimetres, 0.0002 for 1/5000 m, 10 if habitat-lab scaled 10 m to 0..1; default:
+    /// that of the kind of data set, 1 for floats in .npy and HDF5
     #[arg(long, value_name = "METRES", value_parser = positive, add = Decides::Pixels)]
     pub depth_scale: Option<f64>,
     /// What depth is measured along; default: planar

@@ -32,7 +32,8 @@ pub struct Sending {
     /// random by up to its own length.
     #[arg(skip = FIRST_DELAY)]
     pub first_delay: Duration,
-    /// Seconds for which an endpoint may turn all requests away (status 429) before the run stops; these refusals do not count as retries
+    /// Seconds for which an endpoint may turn all requests away (rate limit, overload, loading a model) before the run stops; these
+    /// refusals do not count as retries
     #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "1800", add = Decides::Nothing)]
     pub patience: Duration,
     /// Longest wait in seconds that a server may ask for; a longer one fails the request

@@ -28,7 +28,8 @@ pub struct Parameters {
     /// The model, by the endpoint's name.
     #[arg(skip)]
     pub model: String,
-    /// Sampling temperature; default is the server's own; auto is 0, or if the model refuses 0 the least it takes or the server's own
+    /// Sampling temperature; default is the server's own; auto is 0; if the model refuses 0, the lowest value that it states, else the
+    /// server's own
     #[arg(long, value_name = "T|auto|default", default_value_t = Temperature::Auto, add = Decides::Reply)]
     pub temperature: Temperature,
     /// Nucleus sampling: draw from the likeliest tokens up to this total probability; default: not sent
