@@ -97,7 +97,7 @@
 //! | `scenes` | `rooms` | the built-in rooms, drawn by a seed with all their maps |
 //! | `questions` | `darkqa_questions` | a frame with its maps → questions with one true answer, by rule; the observer: what the rules could still answer from given pixels; and answers from maps that a network predicted |
 //! | `enhance` | `darkqa_enhance` | a degraded image → an enhanced one, by the user's ONNX model; `models` has the networks that the program carries |
-//! | `choice` | `darkqa_score::choice` | a reply → a choice or a mark |
+//! | `choice` | `darkqa_score::choice` | a reply → its answer without thoughts: a choice, a mark or a text |
 //! | `statistics` | `darkqa_score` | estimates with intervals, tests and thresholds of clustered replies |
 //! | `score` | `darkqa_score` | records → numbers with their intervals |
 //! | `store` | `store` | the folder of a run, `results/<run>/`: append-only and resumable |
