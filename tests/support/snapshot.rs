@@ -99,6 +99,11 @@ pub fn lines_with(text: &str, part: &str) -> String {
     }
 }
 
+/// The words of a text without its line breaks.
+pub fn on_one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
 /// Every row of a table, and below each what came of it.
 pub fn each<T: Display>(
     rows: impl IntoIterator<Item = T>,

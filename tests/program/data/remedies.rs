@@ -3,6 +3,7 @@
 use std::fs;
 
 use crate::support::run::{Bench, words};
+use crate::support::snapshot::on_one_line;
 
 /// A message of a command, with the remedy that it prints.
 struct Remedy {
@@ -115,7 +116,7 @@ const REMEDIES: [Remedy; 4] = [
 fn said(bench: &Bench, command: &str) -> String {
     let called = bench.call(&words(command));
     let all = called.stdout + " " + &called.stderr;
-    all.split_whitespace().collect::<Vec<_>>().join(" ")
+    on_one_line(&all)
 }
 
 #[test]

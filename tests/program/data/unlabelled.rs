@@ -6,7 +6,7 @@ use std::fs;
 use serde_json::{Value, json};
 
 use crate::support::run::{Bench, records, words};
-use crate::support::snapshot::redacted;
+use crate::support::snapshot::{on_one_line, redacted};
 
 /// Number of photographs.
 const PHOTOGRAPHS: usize = 12;
@@ -56,11 +56,6 @@ const ASKED: &str = "--data photos --ask bank.jsonl --model script:eyes.jsonl --
 
 fn text(bench: &Bench, name: &str) -> String {
     fs::read_to_string(bench.path(name)).unwrap()
-}
-
-/// The words of a text without its line breaks.
-fn on_one_line(text: &str) -> String {
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 /// The rows of a CSV file, by column.

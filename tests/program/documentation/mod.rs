@@ -22,6 +22,7 @@ use crate::support::lerobot::Set;
 use crate::support::recording::{Compression, drive};
 use crate::support::rooms::rooms;
 use crate::support::run::{Bench, PROGRAM};
+use crate::support::snapshot::on_one_line;
 use crate::support::table::check_rows;
 use darkqa_eval::cli;
 use page::{Block, BlockKind, Page, files, pages, root};
@@ -190,15 +191,14 @@ fn script(page: &Page) -> String {
 /// The lines of the page's `text` blocks of which no printed line has the beginning. The numbers of a page are from a larger run,
 /// so each line counts up to its first digit; lines that frame a table do not count.
 fn missing_lines(page: &Page, printed: &str) -> Vec<String> {
-    let one_space = |line: &str| line.split_whitespace().collect::<Vec<_>>().join(" ");
-    let printed: Vec<String> = printed.lines().map(one_space).collect();
+    let printed: Vec<String> = printed.lines().map(on_one_line).collect();
     page.blocks
         .iter()
         .filter(|block| block.kind == BlockKind::Output)
         .flat_map(|block| (block.line + 1..).zip(&block.lines))
         .filter(|(_, line)| {
             let begin = line.split(|c: char| c.is_ascii_digit()).next();
-            let begin = one_space(begin.unwrap_or_default());
+            let begin = on_one_line(begin.unwrap_or_default());
             begin.chars().any(char::is_alphabetic)
                 && !printed.iter().any(|line| line.starts_with(&begin))
         })

@@ -11,7 +11,7 @@ use crate::support::endpoint::{Answer, MockEndpoint};
 #[cfg(unix)]
 use crate::support::process::{signal, wait_until};
 use crate::support::run::{Bench, Called, model_args, records, words};
-use crate::support::snapshot::{lines_with, redacted};
+use crate::support::snapshot::{lines_with, on_one_line, redacted};
 use crate::support::table::{check_rows, check_rows_at_once};
 
 const PRICES: &str = "as-of = \"2026-01-01\"\nbatch = 0.5\n[models]\nm = { input = 1000, output = 0, image-tokens = 70 }\n";
@@ -371,7 +371,7 @@ fn replies_beyond_their_limit_are_said() {
     let requests = mock.requests().len() as u64;
     let sentence = format!("than --max-tokens: m ({})", requests - 2);
     for text in [&called.stderr, &called.stdout] {
-        let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
+        let text = on_one_line(text);
         assert!(text.contains(&sentence), "{sentence}: {called:?}");
     }
     // The same command asks nothing more.

@@ -4,6 +4,7 @@ use serde_json::{Value, json};
 
 use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::run::{Bench, words};
+use crate::support::snapshot::on_one_line;
 
 /// A folder with ten questions about images of these sizes.
 fn bench(sizes: &[(u32, u32)]) -> Bench {
@@ -51,7 +52,7 @@ fn told(sizes: &[(u32, u32)], tokens: fn(u64, u64) -> u64) -> [String; 2] {
     let run = bench.call(&words(&line)).ended(0);
     let report = bench.call(&words("report run")).ended(0);
     [run.stderr, report.stdout].map(|text| {
-        let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
+        let text = on_one_line(&text);
         let start = text.find("qwen2.5-vl-7b: the server counts about");
         start.map_or_else(String::new, |start| {
             let text = &text[start..];

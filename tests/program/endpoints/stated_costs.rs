@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 
 use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::run::{Bench, Called, model_args, records, words};
+use crate::support::snapshot::on_one_line;
 use crate::support::table::check_rows_at_once;
 
 /// A prompt of 100 tokens costs $0.10, a reply nothing.
@@ -41,11 +42,6 @@ fn call(bench: &Bench, mock: &MockEndpoint, more: &str) -> Called {
     let base = mock.base_url();
     let line = format!("--data set.jsonl --levels L0 --out run --prices prices.toml {more}");
     bench.call(&model_args(&base, &line))
-}
-
-/// The text with all white space as single spaces.
-fn flat(text: &str) -> String {
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 /// The way in which a vendor states a charge of some dollars.
@@ -119,12 +115,12 @@ fn bills_are_those_of_the_vendors() {
             .map(|record| record["usage"]["cost"].as_f64().unwrap())
             .sum();
         assert!((kept - bill).abs() < 1e-9, "{vendor}: {kept}");
-        let report = flat(&bench.complete(&words("report run")));
-        for text in [flat(&called.stdout), report] {
+        let report = on_one_line(&bench.complete(&words("report run")));
+        for text in [on_one_line(&called.stdout), report] {
             let cost = "$3.38 as its replies state, against $0.6000 at the prices of 2026-01-01";
             assert!(text.contains(cost), "{vendor}: {text}");
         }
-        let told = flat(&called.stderr);
+        let told = on_one_line(&called.stderr);
         assert_eq!(
             told.matches("as its server states").count(),
             1,
@@ -239,7 +235,7 @@ fn odd_charges_are_ignored_and_said() {
             (Some(3), 7),
             "{usage}: {called:?}"
         );
-        let told = flat(&called.stderr);
+        let told = on_one_line(&called.stderr);
         assert_eq!(told.matches(said).count(), 1, "{usage}: {told}");
     }
 }
@@ -253,7 +249,7 @@ fn stated_charges_need_no_price() {
     let line = "--data set.jsonl --levels L0 --out run";
     let called = bench.call(&model_args(&base, line)).ended(0);
     assert!(
-        flat(&called.stdout).contains("$1.00 as its replies state"),
+        on_one_line(&called.stdout).contains("$1.00 as its replies state"),
         "{called:?}"
     );
 }
@@ -283,7 +279,7 @@ fn streams_and_responses_state_charges() {
         let mock = MockEndpoint::start([answer]);
         let called = call(&bench, &mock, &format!("--request wire={wire}")).ended(0);
         assert!(
-            flat(&called.stdout).contains("$0.5000 as its replies state"),
+            on_one_line(&called.stdout).contains("$0.5000 as its replies state"),
             "{wire}: {called:?}"
         );
     }
@@ -331,7 +327,7 @@ fn service_tiers_have_their_own_prices() {
         );
     }
     let (_, called) = within_limit(at(json!("flex")), "");
-    let told = flat(&called.stderr);
+    let told = on_one_line(&called.stderr);
     assert_eq!(
         told.matches("a service tier without a price in the table")
             .count(),
@@ -360,7 +356,7 @@ fn a_tier_without_a_price_is_refused_before_the_first_request() {
     args.extend(["--extra-body", r#"{"service_tier":"flex"}"#]);
     let called = bench.call(&args).ended(0);
     assert!(
-        flat(&called.stdout).contains("$0.1000 at the prices"),
+        on_one_line(&called.stdout).contains("$0.1000 at the prices"),
         "{called:?}"
     );
     // Without a limit and without a price, the run says why its cost is not known.
@@ -369,7 +365,7 @@ fn a_tier_without_a_price_is_refused_before_the_first_request() {
         .iter()
         .map(|word| if *word == "run" { "other" } else { word });
     let called = bench.call(&again.collect::<Vec<_>>()).ended(0);
-    let told = flat(&called.stderr);
+    let told = on_one_line(&called.stderr);
     assert!(told.contains("m: its cost is not known: the table of 2026-01-01 has no price of m at the service tier"), "{told}");
 }
 
@@ -397,7 +393,7 @@ fn versions_have_the_price_of_their_model_only_if_the_table_says_so() {
         assert!(called.stdout.contains(cost), "{model}: {called:?}");
     }
     let refused = run("gpt-4o-2031-01-01", None).ended(2);
-    let told = flat(&refused.stderr);
+    let told = on_one_line(&refused.stderr);
     let reason = "has a price of gpt-4o, and does not say that gpt-4o-2031-01-01 costs the same";
     assert!(told.contains(reason), "{told}");
     let own = PRICES.replace("m = {", "gpt-4o-2031-01-01 = {");
@@ -467,7 +463,7 @@ fn simulate(seed: u64) -> (f64, f64) {
         "seed {seed}: {called:?}"
     );
     if over > 1e-6 {
-        let told = flat(&called.stderr);
+        let told = on_one_line(&called.stderr);
         assert!(
             told.contains("more than the")
                 && told.contains("charged more than the price table: m ("),

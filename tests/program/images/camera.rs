@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use crate::support::frames::png;
 use crate::support::house::House;
 use crate::support::run::{Bench, assert_same_products, records, words};
-use crate::support::snapshot::redacted;
+use crate::support::snapshot::{on_one_line, redacted};
 use crate::support::table::check_rows;
 
 /// Number of frames, each with one question: enough replies and clusters for a threshold.
@@ -73,7 +73,7 @@ fn exposure_times_have_own_axis() {
         "automatic exposure: Darkness costs 100.0 points at L5, from 100.0 % at L0.",
         "Motion blur costs 100.0 points at T133.33, from 100.0 % at L0.",
     ] {
-        let said = findings.split_whitespace().collect::<Vec<_>>().join(" ");
+        let said = on_one_line(&findings);
         assert!(said.contains(sentence), "{sentence}: {findings}");
         let page = read(&run.join("report.html"));
         assert!(page.contains(sentence), "{sentence}");

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use crate::reports::compared::Scene;
 use crate::support::run::{Bench, records, words};
-use crate::support::snapshot::redacted;
+use crate::support::snapshot::{on_one_line, redacted};
 use crate::support::table::check_rows;
 use serde_json::Value;
 
@@ -197,7 +197,7 @@ fn runs_under_other_rules_keep_controls() {
         |alert| assert!(full.contains(alert), "{alert}: {full}"),
     );
     let short = bench.complete(&words("report a b"));
-    let joined = short.split_whitespace().collect::<Vec<_>>().join(" ");
+    let joined = on_one_line(&short);
     check_rows(
         [
             "observer: known-signal observer",
@@ -229,7 +229,7 @@ fn only_models_decide_worse() {
     copied(&scene.bench, "few", "fewer", |record| answer(record, 1));
     let (code, stdout, _) = judged("report fewer --baseline few");
     assert_eq!(code, Some(0));
-    let joined = stdout.split_whitespace().collect::<Vec<_>>().join(" ");
+    let joined = on_one_line(&stdout);
     assert!(
         joined.contains("No verdict against few is possible")
             && !joined.contains("It is not shown that any"),

@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 use crate::support::endpoint::{Answer, MockEndpoint, Request};
 use crate::support::house::House;
 use crate::support::run::{Bench, Called, model_args, records, words};
+use crate::support::snapshot::on_one_line;
 use crate::support::table::check_rows_at_once;
 
 /// Number of questions of each run.
@@ -353,7 +354,7 @@ fn printed_remedies_help() {
             "{name}: a reply was asked twice"
         );
         let shown = bench.complete(&["report", "run", "--full"]);
-        let plain = shown.split_whitespace().collect::<Vec<_>>().join(" ");
+        let plain = on_one_line(&shown);
         assert!(plain.contains(report), "{name}: {shown}");
         // Without a change, the report names none.
         assert!(
@@ -556,7 +557,7 @@ fn least_temperature_is_sent() {
             Some(_) => "the temperature is sent as 0.01, the least that it takes",
             None => "no temperature is sent",
         };
-        let plain = printed.split_whitespace().collect::<Vec<_>>().join(" ");
+        let plain = on_one_line(&printed);
         assert!(plain.contains(words), "{printed}");
     }
 }

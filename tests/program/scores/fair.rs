@@ -4,7 +4,7 @@ use std::fs;
 
 use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::run::{Bench, model_args, records, words};
-use crate::support::snapshot::{lines_with, redacted};
+use crate::support::snapshot::{lines_with, on_one_line, redacted};
 use serde_json::{Value, json};
 
 /// The arguments of every run, and more of them.
@@ -184,7 +184,7 @@ fn constraint_is_sent_and_parsed() {
         1
     );
     let report = of("free");
-    let report = report.split_whitespace().collect::<Vec<_>>().join(" ");
+    let report = on_one_line(&report);
     let counted = records(&bench.path("free")).len();
     let expected = format!("Constraint not followed: {counted} of {counted} replies of m");
     assert!(report.contains(&expected), "{report}");
@@ -266,7 +266,7 @@ fn earlier_parsing_is_reported() {
         }
         fs::write(&manifest, earlier.to_string()).unwrap();
         let report = bench.complete(&["report", "run"]);
-        let said = report.split_whitespace().collect::<Vec<_>>().join(" ");
+        let said = on_one_line(&report);
         assert!(said.contains(&change), "{report}");
         let rescored = bench.complete(&["report", "run", "--rescore"]);
         assert!(

@@ -7,6 +7,7 @@ use serde_json::Value;
 
 use crate::support::onnx::{self, Graph};
 use crate::support::run::{Bench, Called, words};
+use crate::support::snapshot::on_one_line;
 
 /// An evaluation of the rooms with the enhancer `model.onnx`.
 const ASK: &str = "--model random --data rooms --levels L3 --limit 9 --out run";
@@ -202,11 +203,7 @@ fn an_output_normalised_like_the_stated_input_is_found() {
         let stated = format!("mean = {mean:?}\nstd = {std:?}\n");
         let called = ask(&bench(&graph, &stated), "");
         assert_eq!(called.code, Some(2), "{called:?}");
-        let message = called
-            .stderr
-            .split_whitespace()
-            .collect::<Vec<_>>()
-            .join(" ");
+        let message = on_one_line(&called.stderr);
         let lines = format!("{stated}mean_out = {mean:?}\nstd_out = {std:?}\n");
         for line in lines.lines() {
             assert!(message.contains(&format!("`{line}`")), "{line}: {message}");

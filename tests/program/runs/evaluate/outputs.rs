@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use super::text;
 use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::run::{Bench, model_args, records, words};
-use crate::support::snapshot::lines_with;
+use crate::support::snapshot::{lines_with, on_one_line};
 use crate::support::table::check_rows;
 
 #[test]
@@ -136,7 +136,7 @@ fn router_providers_are_counted() {
             .collect();
         kept.sort();
         assert_eq!(kept, ["a", providers[1], providers[1]]);
-        let printed = printed.split_whitespace().collect::<Vec<_>>().join(" ");
+        let printed = on_one_line(&printed);
         let said = "m was served by a (1 reply), b (2 replies)";
         assert_eq!(printed.contains(said), several, "{printed}");
     }
