@@ -94,6 +94,18 @@ impl Answer {
         )
     }
 
+    /// A stream of these events.
+    pub fn stream(events: &[&str]) -> Self {
+        let events = events.iter().map(|event| format!("data: {event}\n\n"));
+        Self::new(200, events.collect::<String>()).header("content-type", "text/event-stream")
+    }
+
+    /// A whole chat completion as a stream of one piece.
+    pub fn streamed_text(text: &str) -> Self {
+        let choice = json!({"index": 0, "delta": {"content": text}, "finish_reason": "stop"});
+        Self::stream(&[&json!({"choices": [choice]}).to_string(), "[DONE]"])
+    }
+
     /// A complete chat completion with this number of prompt tokens.
     pub fn message_charged(text: &str, prompt_tokens: u64) -> Self {
         let message = json!({"role": "assistant", "content": text});

@@ -20,9 +20,7 @@ fn cutting(is_cut: fn(&str) -> bool) -> MockEndpoint {
     MockEndpoint::answering(move |body| {
         let text = body["messages"][0]["content"].to_string();
         if body["stream"] == true {
-            let piece = json!({"choices": [{"index": 0, "delta": {"content": "C"}, "finish_reason": "stop"}]});
-            return Answer::new(200, format!("data: {piece}\n\ndata: [DONE]\n\n"))
-                .header("content-type", "text/event-stream");
+            return Answer::streamed_text("C");
         }
         if is_cut(&text) {
             Answer::new(524, "<html><title>524: A timeout occurred</title>")

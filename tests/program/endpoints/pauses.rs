@@ -5,8 +5,6 @@ use std::process::Stdio;
 use std::thread;
 use std::time::Duration;
 
-use serde_json::json;
-
 use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::process::{signal, wait_until};
 use crate::support::run::{Bench, model_args, records};
@@ -39,12 +37,7 @@ impl Reply {
                 Answer::text("C")
             }
             Self::Dripping => Answer::text("C").drip(2),
-            Self::Stream => {
-                let piece = json!({"choices": [{"index": 0, "delta": {"content": "C"}, "finish_reason": "stop"}]});
-                Answer::new(200, format!("data: {piece}\n\ndata: [DONE]\n\n"))
-                    .header("content-type", "text/event-stream")
-                    .drip(4)
-            }
+            Self::Stream => Answer::streamed_text("C").drip(4),
         })
     }
 

@@ -256,23 +256,17 @@ fn stated_charges_need_no_price() {
 
 #[test]
 fn streams_and_responses_state_charges() {
-    let event = |value: Value| format!("data: {value}\n\n");
-    let stream = [
-        event(json!({"choices": [{"index": 0, "delta": {"content": "C"}, "finish_reason": "stop"}]})),
-        event(json!({"choices": [], "usage": {"prompt_tokens": 100, "completion_tokens": 1, "cost": 0.25}})),
-        "data: [DONE]\n\n".to_owned(),
-    ]
-    .concat();
+    let piece =
+        json!({"choices": [{"index": 0, "delta": {"content": "C"}, "finish_reason": "stop"}]});
+    let usage = json!({"choices": [], "usage": {"prompt_tokens": 100, "completion_tokens": 1, "cost": 0.25}});
+    let stream = Answer::stream(&[&piece.to_string(), &usage.to_string(), "[DONE]"]);
     let response = json!({
         "status": "completed", "service_tier": "priority",
         "output": [{"type": "message", "content": [{"type": "output_text", "text": "C"}]}],
         "usage": {"input_tokens": 100, "output_tokens": 1, "cost_in_usd_ticks": 2_500_000_000_u64},
     });
     for (wire, answer) in [
-        (
-            "chat-stream",
-            Answer::new(200, stream).header("content-type", "text/event-stream"),
-        ),
+        ("chat-stream", stream),
         ("responses", Answer::json(200, &response)),
     ] {
         let bench = Bench::with_questions(2);

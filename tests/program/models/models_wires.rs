@@ -29,9 +29,7 @@ fn endpoint() -> MockEndpoint {
             );
         }
         if body["stream"] == true {
-            let delta = json!({"choices": [{"index": 0, "delta": {"content": "C"}, "finish_reason": "stop"}]});
-            let events = format!("data: {delta}\n\ndata: [DONE]\n\n");
-            return Answer::new(200, events).header("content-type", "text/event-stream");
+            return Answer::streamed_text("C");
         }
         Answer::text("C")
     })

@@ -34,9 +34,7 @@ impl Server {
             if body.get("stream").is_none() {
                 return Answer::text(text);
             }
-            let piece = json!({"choices": [{"index": 0, "delta": {"content": text}, "finish_reason": "stop"}]});
-            Answer::new(200, format!("data: {piece}\n\ndata: [DONE]\n\n"))
-                .header("content-type", "text/event-stream")
+            Answer::streamed_text(text)
         });
         Self { mock, answered }
     }

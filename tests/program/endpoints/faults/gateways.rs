@@ -4,7 +4,7 @@ use darkqa_eval::internals::ask::{Parameters, Reach, Sending, WireSetting};
 use darkqa_ground::types::{FailureKind, Finish};
 use serde_json::Value;
 
-use super::{Outcome, PIECE, ask, ask_with, sending, stream};
+use super::{Outcome, PIECE, ask, ask_with, sending};
 use crate::support::endpoint::Answer;
 use crate::support::snapshot::redacted;
 use crate::support::table::check_rows;
@@ -32,7 +32,7 @@ fn is_stream(request: &Value) -> bool {
 
 #[test]
 fn cut_request_is_asked_as_stream() {
-    let outcome = ask(vec![cut(), stream(&[STOP, DONE])]);
+    let outcome = ask(vec![cut(), Answer::stream(&[STOP, DONE])]);
     let reply = outcome.result.unwrap();
     assert_eq!((reply.text.as_str(), reply.attempts), ("B", 2));
     assert!(!is_stream(&outcome.requests[0]) && is_stream(&outcome.requests[1]));
@@ -105,8 +105,8 @@ fn quick_timeouts_are_retried() {
 #[test]
 fn broken_streams_are_sent_twice() {
     let broken = [
-        stream(&[PIECE]),
-        stream(&[PIECE, "{\"choi"]),
+        Answer::stream(&[PIECE]),
+        Answer::stream(&[PIECE, "{\"choi"]),
         Answer::raw(format!(
             "HTTP/1.1 200 OK\r\ncontent-type: text/event-stream\r\ncontent-length: 999\r\n\r\ndata: {PIECE}\n\n"
         )),
@@ -118,7 +118,7 @@ fn broken_streams_are_sent_twice() {
         assert!(error.failure.message.contains("--retries paid"), "{error}");
     });
     // Nothing was generated.
-    let outcome = ask_by(WireSetting::ChatStream, vec![stream(&[DONE])]);
+    let outcome = ask_by(WireSetting::ChatStream, vec![Answer::stream(&[DONE])]);
     assert_eq!(outcome.requests.len(), 6);
 }
 
@@ -132,7 +132,7 @@ fn stream_without_finish_reason_is_read_once() {
             vec![PIECE, counts, DONE],
         ],
         |events| {
-            let outcome = ask_by(WireSetting::ChatStream, vec![stream(&events)]);
+            let outcome = ask_by(WireSetting::ChatStream, vec![Answer::stream(&events)]);
             let reply = outcome.result.unwrap();
             assert_eq!((reply.text.as_str(), reply.attempts), ("B", 1));
             assert_eq!(reply.finish, Finish::Unknown);

@@ -90,13 +90,4 @@ fn completion(message: &str) -> String {
     format!(r#"{{"choices":[{{"index":0,"message":{message},"finish_reason":"stop"}}]}}"#)
 }
 
-fn stream(events: &[&str]) -> Answer {
-    let events: Vec<String> = events
-        .iter()
-        .map(|event| format!("data: {event}"))
-        .collect();
-    let events = events.join("\n\n") + "\n\n";
-    Answer::new(200, events).header("content-type", "text/event-stream")
-}
-
 const PIECE: &str = r#"{"choices":[{"index":0,"delta":{"content":"B"}}]}"#;

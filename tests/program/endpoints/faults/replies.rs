@@ -3,7 +3,7 @@
 use darkqa_ground::types::Finish;
 use serde_json::json;
 
-use super::{PIECE, ask, completion, gzipped, stream};
+use super::{PIECE, ask, completion, gzipped};
 use crate::support::endpoint::Answer;
 use crate::support::table::check_rows;
 
@@ -140,7 +140,7 @@ fn message_is_found_in_every_shape() {
         ("compressed", gzipped(plain.as_bytes()), "B", Finish::Stop),
         (
             "an event stream",
-            stream(&[
+            Answer::stream(&[
                 PIECE,
                 r#"{"choices":[{"index":0,"delta":{},"finish_reason":"stop"}]}"#,
                 "[DONE]",
@@ -150,7 +150,7 @@ fn message_is_found_in_every_shape() {
         ),
         (
             "an event stream without an end mark",
-            stream(&[
+            Answer::stream(&[
                 r#"{"choices":[{"index":0,"delta":{"content":"B"},"finish_reason":"length"}]}"#,
             ]),
             "B",

@@ -6,7 +6,7 @@ use darkqa_eval::internals::ask::{Parameters, Reach, Sending};
 use darkqa_ground::types::FailureKind;
 use serde_json::json;
 
-use super::{PIECE, ask, ask_with, completion, gzip, sending, stream};
+use super::{PIECE, ask, ask_with, completion, gzip, sending};
 use crate::support::endpoint::Answer;
 use crate::support::snapshot::redacted;
 use crate::support::table::{check_rows, check_rows_at_once};
@@ -72,12 +72,12 @@ fn what_may_pass_is_tried_again() {
             Answer::message(&json!({"content": "B"}), "error"),
         ),
         ("a page", html),
-        ("a stream that broke off", stream(&[PIECE])),
+        ("a stream that broke off", Answer::stream(&[PIECE])),
         (
             "a stream with an error",
-            stream(&[PIECE, r#"{"error":{"message":"overloaded","code":503}}"#]),
+            Answer::stream(&[PIECE, r#"{"error":{"message":"overloaded","code":503}}"#]),
         ),
-        ("a stream of nothing", stream(&["[DONE]"])),
+        ("a stream of nothing", Answer::stream(&["[DONE]"])),
         (
             "an error with status 200",
             Answer::json(200, &json!({"error": {"message": "no", "code": 502}})),

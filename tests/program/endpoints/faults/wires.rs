@@ -6,7 +6,7 @@ use darkqa_eval::internals::ask::{Parameters, Reach, Sending, WireSetting};
 use darkqa_ground::types::{FailureKind, Finish, Reply};
 use serde_json::{Value, json};
 
-use super::{ask, ask_with, sending, stream};
+use super::{ask, ask_with, sending};
 use crate::support::endpoint::Answer;
 use crate::support::table::check_rows;
 
@@ -41,7 +41,7 @@ fn streamed(text: &[&str]) -> Answer {
     events.push(delta(&json!({}), Some("stop")));
     events.extend([USAGE.to_owned(), "[DONE]".to_owned()]);
     let events: Vec<&str> = events.iter().map(String::as_str).collect();
-    stream(&events)
+    Answer::stream(&events)
 }
 
 fn response(text: &str) -> Answer {
@@ -164,9 +164,9 @@ fn broken_stream_is_asked_again() {
     let piece = delta(&json!({"content": "A"}), None);
     let error = r#"{"error":{"message":"overloaded","code":529}}"#;
     let broken = [
-        stream(&[&piece]),
-        stream(&[&piece, error]),
-        stream(&[&piece, "{\"choi"]),
+        Answer::stream(&[&piece]),
+        Answer::stream(&[&piece, error]),
+        Answer::stream(&[&piece, "{\"choi"]),
         streamed(&["A"]).cut(60),
     ];
     check_rows(broken, |broken| {

@@ -97,10 +97,7 @@ fn discovered_wire_keeps_trial_key() {
         if body.get("stream").is_none() {
             return Answer::error(400, "x", "please enable the stream parameter");
         }
-        let piece =
-            json!({"choices": [{"index": 0, "delta": {"content": "C"}, "finish_reason": "stop"}]});
-        let body = format!("data: {piece}\n\ndata: [DONE]\n\n");
-        Answer::new(200, body).header("content-type", "text/event-stream")
+        Answer::streamed_text("C")
     });
     let base = stream_only.base_url();
     let run = |flags: &str| {
