@@ -1,5 +1,6 @@
 //! A call of the program in an empty folder, and what it left there.
 
+use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -71,6 +72,22 @@ impl Bench {
         path
     }
 
+    /// Writes a shell script as a program into the folder `bin`.
+    #[cfg(unix)]
+    pub fn program(&self, name: &str, script: &str) {
+        use std::os::unix::fs::PermissionsExt as _;
+
+        let path = self.file(&format!("bin/{name}"), format!("#!/bin/sh\n{script}\n"));
+        fs::set_permissions(path, fs::Permissions::from_mode(0o755)).unwrap();
+    }
+
+    /// Value of `PATH` by which the programs in `bin` are found before others.
+    pub fn search_path(&self) -> OsString {
+        let system = std::env::var_os("PATH").unwrap_or_default();
+        let folders = std::iter::once(self.path("bin")).chain(std::env::split_paths(&system));
+        std::env::join_paths(folders).unwrap()
+    }
+
     /// The program without any setting of the surroundings, the network's proxies aside.
     pub fn command(&self, words: &[&str]) -> Command {
         let mut command = Command::new(PROGRAM);
@@ -92,6 +109,11 @@ impl Bench {
 
     pub fn call(&self, words: &[&str]) -> Called {
         called(&mut self.command(words))
+    }
+
+    /// A call that finds the programs in `bin` before others.
+    pub fn call_with_programs(&self, words: &[&str]) -> Called {
+        called(self.command(words).env("PATH", self.search_path()))
     }
 
     /// A call that must end with everything scored.

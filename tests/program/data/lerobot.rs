@@ -4,6 +4,7 @@ use std::fs;
 
 use serde_json::{Value, json};
 
+use super::recordings::frames;
 use crate::support::image_files::png;
 use crate::support::lerobot::{FRONT, Set, WRIST, grey, has_ffmpeg, picture, task};
 use crate::support::run::{Bench, Called, words};
@@ -22,14 +23,6 @@ fn import(bench: &Bench, line: &str) -> Called {
 /// Import of one camera into `out`.
 fn import_front(bench: &Bench, line: &str) -> Called {
     import(bench, &format!("--camera {FRONT} --out out {line}"))
-}
-
-/// The lines of `out/frames.jsonl`.
-fn frames(bench: &Bench) -> Vec<Value> {
-    let text = fs::read_to_string(bench.path("out/frames.jsonl")).unwrap();
-    text.lines()
-        .map(|line| serde_json::from_str(line).unwrap())
-        .collect()
 }
 
 /// Episode and frame of each line.
@@ -567,8 +560,6 @@ fn a_playlist_in_place_of_a_video_is_not_followed() {
 #[cfg(unix)]
 #[test]
 fn a_missing_decoder_is_named_with_its_remedy() {
-    use std::os::unix::fs::PermissionsExt as _;
-
     let lines = [
         ("Decoder (codec av1) not found for input stream #0:0", 1),
         (
@@ -594,15 +585,9 @@ fn a_missing_decoder_is_named_with_its_remedy() {
             bench.file(&name, "x");
         }
         let script = format!(
-            "#!/bin/sh\necho 'ffmpeg version 5.1.6 Copyright' >&2\necho '  Stream #0:0: Video: av1 (Main) (av01 / 0x31307661), yuv420p' >&2\necho \"{line}\" >&2\nexit {code}\n"
+            "echo 'ffmpeg version 5.1.6 Copyright' >&2\necho '  Stream #0:0: Video: av1 (Main) (av01 / 0x31307661), yuv420p' >&2\necho \"{line}\" >&2\nexit {code}"
         );
-        let path = bench.file("bin/ffmpeg", script);
-        fs::set_permissions(path, fs::Permissions::from_mode(0o755)).unwrap();
-        let call = |words: &[&str]| {
-            let system = std::env::var("PATH").unwrap_or_default();
-            let path = format!("{}:{system}", bench.path("bin").display());
-            crate::support::run::called(bench.command(words).env("PATH", path))
-        };
+        bench.program("ffmpeg", &script);
         let video = format!("set/videos/chunk-000/{FRONT}/episode_000000.mp4");
         let calls: [&[&str]; 2] = [
             &[
@@ -611,7 +596,7 @@ fn a_missing_decoder_is_named_with_its_remedy() {
             &["import", "video", &video, "--out", "out"],
         ];
         for words in calls {
-            let refused = call(words).ended(2);
+            let refused = bench.call_with_programs(words).ended(2);
             assert!(
                 refused
                     .stderr

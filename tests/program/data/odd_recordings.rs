@@ -1,19 +1,15 @@
 //! `import mcap` with odd recordings: broken first images, YUV, video, constant time stamps, other formats.
 
 use std::fs;
-use std::io::Cursor;
 
 use super::recordings::{frames, import, names, with_recording};
+use crate::support::image_files::encoded;
 use crate::support::recording::{Cdr, Records, SIZE, camera_info, compressed, image, picture};
 use crate::support::run::Bench;
 
 /// A JPEG file of [`picture`].
 fn jpeg(number: u8) -> Vec<u8> {
-    let mut file = Cursor::new(Vec::new());
-    picture(number, SIZE)
-        .write_to(&mut file, image::ImageFormat::Jpeg)
-        .unwrap();
-    file.into_inner()
+    encoded(&picture(number, SIZE), image::ImageFormat::Jpeg)
 }
 
 const RAW: &str = "sensor_msgs/msg/Image";

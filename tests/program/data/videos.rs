@@ -5,30 +5,19 @@
 #![cfg(unix)]
 
 use std::fs;
-use std::os::unix::fs::PermissionsExt as _;
 use std::path::Path;
 use std::process::Command;
 
-use serde_json::Value;
-
-use crate::support::run::{Bench, Called};
+use super::recordings::frames;
+use crate::support::run::{Bench, Called, words};
 use crate::support::snapshot::{on_one_line, redacted};
 use darkqa_picture::decode_rule::ColourRule;
 use darkqa_picture::{DecodeRule, ImageFile};
 
-/// The lines of `out/frames.jsonl`.
-fn frames(bench: &Bench) -> Vec<Value> {
-    let text = fs::read_to_string(bench.path("out/frames.jsonl")).unwrap();
-    text.lines()
-        .map(|line| serde_json::from_str(line).unwrap())
-        .collect()
-}
-
 /// A program `ffmpeg` that writes four images, half a second apart, as ffmpeg does.
 fn with_ffmpeg(bench: &Bench, end: &str) {
     let script = format!(
-        r#"#!/bin/sh
-echo "$@" >> {calls}
+        r#"echo "$@" >> {calls}
 echo 'ffmpeg version 5.1.6 Copyright' >&2
 echo '  Duration: 00:00:02.00, start: 0.000000, bitrate: 9 kb/s' >&2
 echo '  Stream #0:0: Video: h264 (High), yuv420p, 4x2, 2 fps' >&2
@@ -38,20 +27,14 @@ for i in 0 1 2 3; do
   echo "[Parsed_showinfo_1 @ 0x1] n: $i pts: $((10 * i + 5)) pts_time:$i.5 duration: 1" >&2
   printf 'P6\n4 2\n255\nabcdefghijklmnopqrstuvw%s' $i
 done
-{end}
-"#,
+{end}"#,
         calls = bench.path("calls").display()
     );
-    let path = bench.file("bin/ffmpeg", script);
-    fs::set_permissions(path, fs::Permissions::from_mode(0o755)).unwrap();
+    bench.program("ffmpeg", &script);
 }
 
-fn import_video(bench: &Bench, line: &str, path: &Path) -> Called {
-    let words: Vec<&str> = line.split_whitespace().collect();
-    let mut command = bench.command(&[&["import", "video", "drive.mp4"], &words[..]].concat());
-    let system = std::env::var("PATH").unwrap_or_default();
-    let path = format!("{}:{system}", path.display());
-    crate::support::run::called(command.env("PATH", path))
+fn import_video(bench: &Bench, line: &str) -> Called {
+    bench.call_with_programs(&[&["import", "video", "drive.mp4"], &words(line)[..]].concat())
 }
 
 #[test]
@@ -59,14 +42,9 @@ fn frames_of_video_come_from_ffmpeg() {
     let bench = Bench::new();
     bench.file("drive.mp4", b"x");
     with_ffmpeg(&bench, "exit 0");
-    let described = import_video(&bench, "", &bench.path("bin")).ended(0);
+    let described = import_video(&bench, "").ended(0);
     assert_eq!(described.stdout, "h264 (High), yuv420p, 4x2, 2 fps; 2 s\n");
-    let called = import_video(
-        &bench,
-        "--every 1 --stretch 2 --out out",
-        &bench.path("bin"),
-    )
-    .ended(0);
+    let called = import_video(&bench, "--every 1 --stretch 2 --out out").ended(0);
     insta::assert_snapshot!(called, @"
     exit code: 0
     stdout:
@@ -96,7 +74,7 @@ fn a_broken_video_gives_its_frames() {
     let bench = Bench::new();
     bench.file("drive.mp4", b"x");
     with_ffmpeg(&bench, "echo 'moov atom not found' >&2; exit 1");
-    let called = import_video(&bench, "--every 0 --out out", &bench.path("bin")).ended(1);
+    let called = import_video(&bench, "--every 0 --out out").ended(1);
     insta::assert_snapshot!(called.messages(), @"
     exit code: 1
      WARN drive.mp4: ffmpeg: it ends with an error; Stream #0:0: Video: h264 (High), yuv420p, 4x2, 2 fps; moov
@@ -110,7 +88,7 @@ fn damage_that_ffmpeg_reports_is_named() {
     let bench = Bench::new();
     bench.file("drive.mp4", b"x");
     with_ffmpeg(&bench, "echo 'error while decoding MB 3 5' >&2; exit 0");
-    let called = import_video(&bench, "--every 0 --out out", &bench.path("bin")).ended(1);
+    let called = import_video(&bench, "--every 0 --out out").ended(1);
     insta::assert_snapshot!(called.messages(), @"
     exit code: 1
      WARN drive.mp4: ffmpeg reports a problem: error while decoding MB 3 5; its frames are kept
@@ -161,8 +139,7 @@ fn with_colours(bench: &Bench, colours: &[&str]) {
         })
         .collect();
     let script = format!(
-        r#"#!/bin/sh
-echo 'ffmpeg version 5.1.6 Copyright' >&2
+        r#"echo 'ffmpeg version 5.1.6 Copyright' >&2
 echo '  Stream #0:0: Video: hevc (Main 10), yuv420p10le(tv, {stream}), 4x1, 1 fps' >&2
 case "$*" in
   *rgb24*) image() {{ printf 'P6\n4 1\n255\n{eight}'; }};;
@@ -175,8 +152,7 @@ echo '[Parsed_showinfo_1 @ 0x1] config in time_base: 1/1, frame_rate: 1/1' >&2
         eight = bytes(samples, 1),
         sixteen = bytes(samples, 2),
     );
-    let path = bench.file("bin/ffmpeg", script);
-    fs::set_permissions(path, fs::Permissions::from_mode(0o755)).unwrap();
+    bench.program("ffmpeg", &script);
     bench.file("drive.mp4", b"x");
 }
 
@@ -215,7 +191,7 @@ fn codes_of_sdr_video_are_kept() {
     ] {
         let bench = Bench::new();
         with_colours(&bench, &[colours, colours]);
-        let called = import_video(&bench, "--every 0 --out out", &bench.path("bin")).ended(0);
+        let called = import_video(&bench, "--every 0 --out out").ended(0);
         assert_eq!(
             (frames(&bench).len(), &*called.stderr),
             (2, ""),
@@ -270,7 +246,7 @@ fn other_colours_of_video_are_converted() {
     ] {
         let bench = Bench::new();
         with_colours(&bench, &[colours, colours]);
-        let called = import_video(&bench, "--every 0 --out out", &bench.path("bin")).ended(0);
+        let called = import_video(&bench, "--every 0 --out out").ended(0);
         assert_near(&first_frame(&bench), &expected);
         assert_eq!(frames(&bench).len(), 2);
         let said = format!("colours: {name}, converted to sRGB\n");
@@ -293,7 +269,7 @@ fn other_colours_of_video_are_converted() {
 fn hdr_video_says_what_is_clipped() {
     let bench = Bench::new();
     with_colours(&bench, &["bt2020nc bt2020 arib-std-b67"]);
-    let called = import_video(&bench, "--every 0 --out out", &bench.path("bin")).ended(0);
+    let called = import_video(&bench, "--every 0 --out out").ended(0);
     insta::assert_snapshot!(called, @"
     exit code: 0
     stdout:
@@ -311,7 +287,7 @@ fn colours_that_cannot_be_converted_are_refused() {
     let bench = Bench::new();
     let refused = |colours: &str| {
         with_colours(&bench, &[colours]);
-        let called = import_video(&bench, "--every 0 --out out", &bench.path("bin")).ended(2);
+        let called = import_video(&bench, "--every 0 --out out").ended(2);
         assert!(!bench.path("out").exists(), "{colours}");
         called.messages()
     };
@@ -341,7 +317,7 @@ fn colours_may_not_change_within_a_video() {
         "bt2020nc bt2020 smpte2084",
     ];
     with_colours(&bench, &colours);
-    let called = import_video(&bench, "--every 0 --out out", &bench.path("bin")).ended(1);
+    let called = import_video(&bench, "--every 0 --out out").ended(1);
     insta::assert_snapshot!(called.messages(), @"
     exit code: 1
      WARN drive.mp4: ffmpeg: the colours change at [TIME]: sRGB codes, then PQ (HDR), BT.2020; ffmpeg version
@@ -359,7 +335,7 @@ fn dolby_vision_without_a_base_layer_is_refused() {
     let script = fs::read_to_string(bench.path("bin/ffmpeg")).unwrap();
     let record = "echo '      DOVI configuration record: version: 1.0, profile: 5, level: 6, rpu flag: 1, el flag: 0, bl flag: 1, compatibility id: 0' >&2\ncase";
     bench.file("bin/ffmpeg", script.replacen("case", record, 1));
-    let called = import_video(&bench, "--every 0 --out out", &bench.path("bin")).ended(2);
+    let called = import_video(&bench, "--every 0 --out out").ended(2);
     insta::assert_snapshot!(called.messages(), @"
     exit code: 2
     error: drive.mp4: the pictures are only for displays with Dolby Vision; export the video for other displays
@@ -368,7 +344,7 @@ fn dolby_vision_without_a_base_layer_is_refused() {
     // The base layer of profile 8.4 is HLG.
     let other = record.replace("compatibility id: 0", "compatibility id: 4");
     bench.file("bin/ffmpeg", script.replacen("case", &other, 1));
-    import_video(&bench, "--every 0 --out out", &bench.path("bin")).ended(0);
+    import_video(&bench, "--every 0 --out out").ended(0);
 }
 
 /// Runs ffmpeg in the bench; `None` if it is not installed.

@@ -201,19 +201,12 @@ fn volumes_are_claimed_with_mode() {
 /// The script with a `kubectl` that writes down what it is told, and whose jobs end as `ends` says.
 #[cfg(unix)]
 fn kubectl(ends: &str) -> (Option<i32>, Vec<String>, String) {
-    use std::os::unix::fs::PermissionsExt as _;
-
     let bench = Bench::new();
-    let script = format!("#!/bin/sh\necho \"$@\" >> \"$TOLD\"\n{ends}\n");
-    let program = bench.file("bin/kubectl", &script);
-    fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
-    let own = [bench.path("bin")].into_iter();
-    let others = std::env::var_os("PATH").unwrap_or_default();
-    let search = std::env::join_paths(own.chain(std::env::split_paths(&others))).unwrap();
+    bench.program("kubectl", &format!("echo \"$@\" >> \"$TOLD\"\n{ends}"));
     let output = std::process::Command::new("bash")
         .arg(path("kubernetes.sh"))
         .args(["--namespace", "night"])
-        .env("PATH", search)
+        .env("PATH", bench.search_path())
         .env("TOLD", bench.path("told"))
         .output()
         .unwrap();
@@ -248,19 +241,12 @@ fn script_applies_steps_in_order() {
 /// The script of Slurm on a login node, with an `sbatch` that writes down what it is told; its code and these lines.
 #[cfg(unix)]
 fn sbatch(parts: &str, words: &[&str]) -> (Option<i32>, Vec<String>) {
-    use std::os::unix::fs::PermissionsExt as _;
-
     let bench = Bench::new();
-    let script = "#!/bin/sh\necho \"$@\" >> \"$TOLD\"\nwc -l < \"$TOLD\"\n";
-    let program = bench.file("bin/sbatch", script);
-    fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
-    let own = [bench.path("bin")].into_iter();
-    let others = std::env::var_os("PATH").unwrap_or_default();
-    let search = std::env::join_paths(own.chain(std::env::split_paths(&others))).unwrap();
+    bench.program("sbatch", "echo \"$@\" >> \"$TOLD\"\nwc -l < \"$TOLD\"");
     let output = std::process::Command::new("bash")
         .arg(path("slurm.sh"))
         .args(words)
-        .env("PATH", search)
+        .env("PATH", bench.search_path())
         .env("TOLD", bench.path("told"))
         .env("PARTS", parts)
         .env("AT_ONCE", "3")

@@ -5,7 +5,9 @@ use std::fs;
 
 use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::process::{signal, wait_until};
-use crate::support::run::{Bench, assert_same_products, called, model_args, records, words};
+use crate::support::run::{
+    Bench, PROGRAM, assert_same_products, called, model_args, records, words,
+};
 use crate::support::snapshot::redacted;
 use serde_json::Value;
 
@@ -252,7 +254,6 @@ fn shards_share_limits_and_resources() {
 #[cfg(unix)]
 #[test]
 fn slurm_script_restarts_stopped_task() {
-    use std::os::unix::fs::PermissionsExt as _;
     use std::time::Duration;
 
     let bench = Bench::with_questions(400);
@@ -260,12 +261,8 @@ fn slurm_script_restarts_stopped_task() {
         std::thread::sleep(Duration::from_millis(20));
         Answer::text("B")
     });
-    let control = bench.file("bin/scontrol", "#!/bin/sh\necho \"$@\" >> told\n");
-    fs::set_permissions(&control, fs::Permissions::from_mode(0o755)).unwrap();
-    let program = std::path::Path::new(env!("CARGO_BIN_EXE_darkqa-eval"));
-    let folders = [bench.path("bin"), program.parent().unwrap().to_owned()];
-    let path = std::env::var_os("PATH").unwrap_or_default();
-    let path = folders.into_iter().chain(std::env::split_paths(&path));
+    bench.program("scontrol", "echo \"$@\" >> told");
+    std::os::unix::fs::symlink(PROGRAM, bench.path("bin/darkqa-eval")).unwrap();
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/src/run/cluster/slurm.sh");
     let base = mock.base_url();
     let args = model_args(
@@ -283,7 +280,7 @@ fn slurm_script_restarts_stopped_task() {
         .args(args)
         .current_dir(bench.path(""))
         .envs(variables)
-        .env("PATH", std::env::join_paths(path).unwrap())
+        .env("PATH", bench.search_path())
         .env_remove("OPENAI_API_KEY")
         .spawn()
         .unwrap();

@@ -4,7 +4,6 @@
 
 use std::collections::BTreeSet;
 use std::fs;
-use std::os::unix::fs::PermissionsExt as _;
 use std::time::Instant;
 
 use crate::support::run::{Bench, Called, called, files, records, words};
@@ -23,12 +22,7 @@ struct Task(u32, u32, u32, u32);
 impl Bench {
     /// Runs an evaluation in `out` as a job whose variables are those of a task of array job 100.
     fn job(&self, scontrol: &str, id: u32, task: Task, line: &str) -> Called {
-        let script = self.file("bin/scontrol", format!("#!/bin/sh\n{scontrol}\n"));
-        fs::set_permissions(&script, fs::Permissions::from_mode(0o755)).unwrap();
-        let path = std::env::var_os("PATH").unwrap_or_default();
-        let path = [self.path("bin")]
-            .into_iter()
-            .chain(std::env::split_paths(&path));
+        self.program("scontrol", scontrol);
         let line = format!("--model random --levels L0,L2 --no-parquet {line}");
         let Task(number, count, first, last) = task;
         let variables = [
@@ -43,7 +37,7 @@ impl Bench {
         let mut command = self.command(&words(&line));
         command
             .envs(variables.map(|(name, value)| (name, value.to_string())))
-            .env("PATH", std::env::join_paths(path).unwrap());
+            .env("PATH", self.search_path());
         called(&mut command)
     }
 
