@@ -74,16 +74,6 @@ pub fn picture(camera: &str, episode: u32, frame: u32) -> RgbImage {
     RgbImage::from_pixel(32, 16, Rgb([code; 3]))
 }
 
-/// True if ffmpeg is on PATH.
-pub fn has_ffmpeg() -> bool {
-    let version = Command::new("ffmpeg")
-        .arg("-version")
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .status();
-    version.is_ok_and(|status| status.success())
-}
-
 impl Set {
     fn is_v3(&self) -> bool {
         self.version.starts_with("v3")

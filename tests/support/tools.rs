@@ -15,3 +15,12 @@ pub fn succeeds(program: &str, arguments: &[&str]) -> bool {
     let output = Command::new(program).args(arguments).output();
     output.is_ok_and(|output| output.status.success())
 }
+
+/// True if ffmpeg is on `PATH`; otherwise the test is skipped.
+pub fn has_ffmpeg() -> bool {
+    let is_there = succeeds("ffmpeg", &["-version"]);
+    if !is_there {
+        skip("there is no ffmpeg");
+    }
+    is_there
+}

@@ -6,8 +6,9 @@ use serde_json::{Value, json};
 
 use super::recordings::frames;
 use crate::support::image_files::png;
-use crate::support::lerobot::{FRONT, Set, WRIST, grey, has_ffmpeg, picture, task};
+use crate::support::lerobot::{FRONT, Set, WRIST, grey, picture, task};
 use crate::support::run::{Bench, Called, words};
+use crate::support::tools::has_ffmpeg;
 
 /// A folder with this set in `set`.
 fn with_set(set: &Set) -> Bench {
@@ -38,16 +39,6 @@ fn change_info(bench: &Bench, set: &Set, change: impl FnOnce(&mut Value)) {
     let mut info = set.info();
     change(&mut info);
     bench.file("set/meta/info.json", info.to_string());
-}
-
-/// False, with a note, if ffmpeg is missing.
-#[expect(clippy::print_stderr, reason = "a note about a skipped test")]
-fn ffmpeg() -> bool {
-    let is_there = has_ffmpeg();
-    if !is_there {
-        eprintln!("skipped: no ffmpeg on PATH");
-    }
-    is_there
 }
 
 const ALL: [[u64; 2]; 7] = [[0, 0], [0, 1], [0, 2], [1, 0], [1, 1], [1, 2], [1, 3]];
@@ -174,7 +165,7 @@ fn flags_choose_frames_in_each_episode() {
 
 #[test]
 fn frames_of_joined_videos_are_those_of_the_rows() {
-    if !ffmpeg() {
+    if !has_ffmpeg() {
         return;
     }
     for version in ["v3.0", "v2.1"] {
@@ -209,7 +200,7 @@ fn frames_of_joined_videos_are_those_of_the_rows() {
 
 #[test]
 fn a_slower_camera_gives_its_own_frames() {
-    if !ffmpeg() {
+    if !has_ffmpeg() {
         return;
     }
     let set = Set {
@@ -229,7 +220,7 @@ fn a_slower_camera_gives_its_own_frames() {
 
 #[test]
 fn missing_and_cut_videos_are_named() {
-    if !ffmpeg() {
+    if !has_ffmpeg() {
         return;
     }
     let set = Set {
@@ -457,7 +448,7 @@ fn camera_names_lead_to_no_video_outside() {
         videos: true,
         ..Set::default()
     };
-    if !ffmpeg() {
+    if !has_ffmpeg() {
         return;
     }
     let bench = with_set(&set);
@@ -531,7 +522,7 @@ fn cached_repository_is_read() {
 /// ffmpeg reads playlists, which name other files, whatever the ending of their name.
 #[test]
 fn a_playlist_in_place_of_a_video_is_not_followed() {
-    if !ffmpeg() {
+    if !has_ffmpeg() {
         return;
     }
     let set = Set {
