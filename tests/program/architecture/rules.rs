@@ -71,8 +71,8 @@ pub(crate) fn library(files: &Files, name: &str, places: &[&str]) -> Vec<String>
     misplaced(&uses.collect::<Vec<_>>(), &format!("`{name}`"), places)
 }
 
-/// Where folders are listed or files are opened by the standard library in `readers`, outside of some places, and the places that do
-/// neither; tests are free.
+/// Where folders are listed or files are opened by the standard library in `readers`, outside of some files; and the places that do
+/// neither, or are folders, in which nothing would be checked. Tests are free.
 pub(crate) fn listings(files: &Files, readers: &[&str], places: &[&str]) -> Vec<String> {
     const WAYS: [[&str; 2]; 6] = [
         ["reading", "entries"],
@@ -97,11 +97,14 @@ pub(crate) fn listings(files: &Files, readers: &[&str], places: &[&str]) -> Vec<
             .collect();
         is_reader && part.is_path() && WAYS.iter().any(|way| way[..] == end)
     });
-    misplaced(
+    let mut wrong = misplaced(
         &uses.collect::<Vec<_>>(),
         "a list of a folder or an open file",
         places,
-    )
+    );
+    let folders = places.iter().filter(|place| !place.contains('.'));
+    wrong.extend(folders.map(|place| format!("{place} is a folder: name its files")));
+    wrong
 }
 
 /// Where a future is awaited outside of some places, and the places that await none; tests are free.

@@ -61,6 +61,11 @@ fn listings_in_other_places_are_reported() {
         &[unused],
         &["dataset/a.rs: #[cfg(test)] mod tests { fn f() { std::fs::read(p) } }"],
     );
+    check(
+        |files: &Files| rules::listings(files, &["dataset"], &["dataset"]),
+        &["dataset is a folder: name its files"],
+        &["dataset/a.rs: use crate::files::reading::entries;"],
+    );
 }
 
 #[test]
