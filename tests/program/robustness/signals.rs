@@ -14,19 +14,49 @@ use crate::support::tools::{skip, succeeds};
 /// Maximum time from a signal to the end; a busy machine may need a few seconds.
 const PROMPT: Duration = Duration::from_secs(20);
 
-/// Commands that run for many seconds, and a path that exists soon after they have begun.
-const LONG: [(&str, &str); 3] = [
-    ("rooms --out rooms --frames 3000 --size 640x480", "rooms"),
+/// Commands that run for many seconds, and the folder that they write into from the start.
+const LONG: [(&str, Option<&str>); 3] = [
+    (
+        "rooms --out rooms --frames 3000 --size 640x480",
+        Some("rooms"),
+    ),
     (
         "synthesize frames --levels L1,L2,L3,L4,L5 --out dark",
-        "dark",
+        Some("dark"),
     ),
-    // It draws the rooms before it asks.
+    // It draws the rooms before it makes the folder of the run.
     (
         "--model observer --data rooms:frames=3000,size=640x480 --levels L0 --out run",
-        "run",
+        None,
     ),
 ];
+
+/// Waits until a process of the program handles all signals and does its work.
+fn wait_for_work(process: u32) {
+    /// SIGHUP, SIGINT and SIGTERM in a mask of `/proc`.
+    const SIGNALS: u64 = 1 | 1 << 1 | 1 << 14;
+    /// Processor time that a start does not take, in hundredths of a second.
+    const WORK: u64 = 50;
+
+    if !cfg!(target_os = "linux") {
+        thread::sleep(Duration::from_secs(2));
+        return;
+    }
+    let read = |name| fs::read_to_string(format!("/proc/{process}/{name}")).unwrap_or_default();
+    wait_until(|| {
+        let status = read("status");
+        let handled = status
+            .lines()
+            .find_map(|line| line.strip_prefix("SigCgt:"))
+            .map_or(0, |mask| u64::from_str_radix(mask.trim(), 16).unwrap());
+        let stat = read("stat");
+        // The name of the program, in parentheses, is the second field; the times are the 14th and 15th.
+        let times = stat.rsplit(')').next().unwrap_or_default();
+        let times = times.split_whitespace().skip(11).take(2);
+        let used: u64 = times.map(|time| time.parse::<u64>().unwrap()).sum();
+        handled & SIGNALS == SIGNALS && used >= WORK
+    });
+}
 
 /// A folder with frames to degrade.
 fn with_frames() -> Bench {
@@ -72,12 +102,8 @@ fn sigterm_ends_long_commands() {
     for (line, begun) in LONG {
         let bench = with_frames();
         let mut process = bench.spawn(&words(line), Stdio::null());
-        // The evaluation draws rooms before it makes the folder of the run.
-        if begun == "run" {
-            thread::sleep(Duration::from_millis(300));
-        } else {
-            wait_until(|| bench.path(begun).exists());
-        }
+        wait_for_work(process.id());
+        wait_until(|| begun.is_none_or(|folder| bench.path(folder).exists()));
         signal(&process, "-TERM");
         assert_eq!(ended_promptly(&mut process, line), Some(130), "{line}");
         assert_eq!(broken(&bench.path("")), [""; 0], "{line}");
@@ -86,14 +112,14 @@ fn sigterm_ends_long_commands() {
 
 #[test]
 fn a_command_that_was_ended_can_be_repeated() {
-    let line = "rooms --out rooms --frames 8 --size 320x240";
+    let line = "rooms --out rooms --frames 24 --size 320x240";
     let whole = Bench::new();
     whole.complete(&words(line));
     let bench = Bench::new();
     let mut process = bench.spawn(&words(line), Stdio::null());
     wait_until(|| bench.path("rooms").exists());
     signal(&process, "-TERM");
-    ended_promptly(&mut process, line);
+    assert_eq!(ended_promptly(&mut process, line), Some(130));
     bench.complete(&words(line));
     let content = |bench: &Bench| -> Vec<(String, Vec<u8>)> {
         let root = bench.path("rooms");
@@ -131,10 +157,8 @@ fn signals_end_the_first_process_of_a_container() {
             let child = || fs::read_to_string(&children).unwrap_or_default();
             wait_until(|| !child().trim().is_empty());
             let first = child().trim().to_owned();
-            // Until the program runs in the child, which unshare forks.
-            let name_of = || fs::read_to_string(format!("/proc/{first}/comm")).unwrap_or_default();
-            wait_until(|| name_of().starts_with("darkqa"));
-            thread::sleep(Duration::from_millis(300));
+            // The child of unshare becomes the program.
+            wait_for_work(first.parse().unwrap());
             let kill = format!("kill -{name} {first}");
             assert!(succeeds("sh", &["-c", &kill]), "{kill}");
             let what = format!("{line} as process 1, {name}");
@@ -150,15 +174,17 @@ fn signals_end_a_run_after_its_last_reply() {
     let (reader, mut writer) = std::io::pipe().unwrap();
     // A pipe takes 64 KiB: the program waits at its first word on standard output.
     writer.write_all(&vec![0; 1 << 16]).unwrap();
-    let line = "--model random --levels L0 --data rooms:frames=2,size=96x64 --out run";
     for name in ["-TERM", "-HUP"] {
+        let out = format!("run{name}");
+        let line =
+            format!("--model random --levels L0 --data rooms:frames=2,size=96x64 --out {out}");
         let stdout = Stdio::from(writer.try_clone().unwrap());
-        let mut process = bench.spawn(&words(line), stdout);
-        wait_until(|| bench.path("run/summary.json").exists());
+        let mut process = bench.spawn(&words(&line), stdout);
+        wait_until(|| bench.path(&out).join("summary.json").exists());
         thread::sleep(Duration::from_secs(2));
         assert!(process.try_wait().unwrap().is_none(), "it waits");
         signal(&process, name);
-        assert_eq!(ended_promptly(&mut process, line), Some(130));
+        assert_eq!(ended_promptly(&mut process, &line), Some(130));
     }
     drop(reader);
 }
