@@ -24,7 +24,7 @@ pub(crate) struct CalibrateArgs {
     /// The recording: DIR/SETTING/ for each ISO or gain, in it bias/, flat-NAME/ for each exposure (pairs of evenly lit frames), and if
     /// you have them dark-NAME/ and white/; or DIR/frames.csv with the columns file, setting, kind (bias, flat, dark, white), exposure
     ///
-    /// Frames are mosaics of one channel as 16-bit PNG, TIFF or binary PGM, as `dcraw -D -4 -T -t 0` (`-t 0`: not turned) and rawpy's raw_image give them. RAW
+    /// Frames are mosaics of one channel as 16-bit PNG, TIFF or binary PGM, as `dcraw -D -4 -T -t 0` (`-t 0`: not turned) and rawpy's raw_image_visible give them. RAW
     /// files of makers (DNG, CR2, NEF) are not read.
     #[arg(value_name = "DIR", add = Decides::Pixels)]
     pub recording: PathBuf,

@@ -3,7 +3,7 @@
 use std::fmt;
 
 /// Advice on exporting the mosaic of a RAW file.
-pub(super) const EXPORT: &str = "export the mosaic, for example as TIFF with `dcraw -D -4 -T -t 0 FILE` (`-t 0`: not turned), or rawpy's `raw_image` as 16-bit PNG";
+pub(super) const EXPORT: &str = "export the mosaic, for example as TIFF with `dcraw -D -4 -T -t 0 FILE` (`-t 0`: not turned), or rawpy's `raw_image_visible` as 16-bit PNG";
 
 /// Form of a file, and the range of its samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

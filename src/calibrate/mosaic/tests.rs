@@ -152,7 +152,7 @@ fn raw_files_are_refused_with_advice() {
         ("a", b"FUJIFILMCCD-RAW 0201".to_vec(), "a RAF file"),
     ] {
         let problem = problem(name, &bytes);
-        for part in [kind, "dcraw -D -4 -T -t 0", "rawpy's `raw_image`"] {
+        for part in [kind, "dcraw -D -4 -T -t 0", "rawpy's `raw_image_visible`"] {
             assert!(problem.contains(part), "{name}: {problem}");
         }
     }

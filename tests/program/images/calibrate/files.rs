@@ -79,13 +79,14 @@ fn unusable_files_are_named() {
     insta::assert_snapshot!(refusals(rows), @"
     truncated: error: cam/iso800/flat-1/01.pgm: not a whole PGM: the file ends early: 65527 bytes of samples, 131072 expected
     foreign: error: cam/iso800/bias/notes.txt: not a mosaic: a 16-bit PNG, a TIFF or a binary PGM expected; export the
-        mosaic, for example as TIFF with `dcraw -D -4 -T -t 0 FILE` (`-t 0`: not turned), or rawpy's `raw_image`
-        as 16-bit PNG
+        mosaic, for example as TIFF with `dcraw -D -4 -T -t 0 FILE` (`-t 0`: not turned), or rawpy's
+        `raw_image_visible` as 16-bit PNG
     raw: error: cam/iso800/bias/01.dng: a DNG file, the RAW format of a camera, is not read; export the mosaic, for
-        example as TIFF with `dcraw -D -4 -T -t 0 FILE` (`-t 0`: not turned), or rawpy's `raw_image` as 16-bit PNG
+        example as TIFF with `dcraw -D -4 -T -t 0 FILE` (`-t 0`: not turned), or rawpy's `raw_image_visible` as
+        16-bit PNG
     developed: error: cam/iso800/bias/00.png: an RGB PNG of 8 bits; 16-bit grey expected, whose samples are the values
         themselves: a developed image holds no sensor noise; export the mosaic, for example as TIFF with `dcraw -D
-        -4 -T -t 0 FILE` (`-t 0`: not turned), or rawpy's `raw_image` as 16-bit PNG
+        -4 -T -t 0 FILE` (`-t 0`: not turned), or rawpy's `raw_image_visible` as 16-bit PNG
     mixed: error: cam/iso800/flat-2/01.png: a 16-bit PNG, but cam/iso800/bias/00.pgm is a PGM with the maximum 65535; all
         frames must be exported in one way
     sizes: error: cam/iso800/flat-2/01.pgm: 256 × 254 sites, but cam/iso800/bias/00.pgm has 256 × 256; all frames must
