@@ -1,15 +1,15 @@
 //! Two-dimensional arrays in HDF5 files written by h5py: [`Hdf5Array`].
 //!
 //! Supports the default output of h5py (HDF5 File Format Specification, version 3.0): superblock versions 0 and 1, symbol-table groups,
-//! version 1 object headers, integers and floats, contiguous and chunked storage, and the filters deflate, shuffle and fletcher32. Files
-//! of `libver="latest"` are refused with a message that says so.
+//! version 1 object headers, integers and floats, contiguous and chunked storage, the filters deflate, shuffle and fletcher32, and user
+//! blocks. Files of `libver="latest"` are refused with a message that says so.
 
 use std::io::Read as _;
 
 use crate::decode_rule::MAX_PIXELS;
 use crate::npy::Npy;
 
-/// The first eight bytes of every HDF5 file.
+/// The first eight bytes of every HDF5 file, after its user block if it has one.
 const SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
 
 /// Maximum number of B-tree nodes visited in a file; chosen. It also ends cyclic trees.
@@ -32,7 +32,7 @@ impl Hdf5Array {
     /// # Errors
     /// If the file is broken, unsupported, or has several arrays but none of this name.
     pub fn parse(file: &[u8], name: &str) -> Result<Self, String> {
-        let file = Bytes(file);
+        let file = Bytes(without_user_block(file).ok_or("not an HDF5 file")?);
         let objects = file.objects(file.root_header()?)?;
         let named = objects.iter().find(|object| object.name == name);
         let array = match (named, &*objects) {
@@ -74,6 +74,15 @@ struct Message<'a> {
     data: Bytes<'a>,
 }
 
+/// The file from its signature on, to which its addresses are relative. A user block of 512 bytes, or of a power of two above, may come
+/// before it.
+fn without_user_block(file: &[u8]) -> Option<&[u8]> {
+    let starts = std::iter::once(0).chain((9..usize::BITS).map(|exponent| 1 << exponent));
+    starts
+        .map_while(|start| file.get(start..))
+        .find(|rest| rest.starts_with(SIGNATURE))
+}
+
 fn truncated() -> String {
     "not a whole HDF5 file: it ends too early".to_owned()
 }
@@ -112,9 +121,6 @@ impl<'a> Bytes<'a> {
 
     /// The address of the object header of the root group.
     fn root_header(self) -> Result<u64, String> {
-        if !self.0.starts_with(SIGNATURE) {
-            return Err("not an HDF5 file".to_owned());
-        }
         let version = self.number(8, 1)?;
         let entry = match version {
             0 => 56,

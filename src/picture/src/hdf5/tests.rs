@@ -169,6 +169,27 @@ fn contiguous_and_chunked_arrays_are_read() {
 }
 
 #[test]
+fn user_blocks_are_skipped() {
+    let ids: Vec<u8> = (0..70).collect();
+    for chunk in [None, Some((2, 3))] {
+        let whole = file(0, 8, (5, 7), &ids, chunk);
+        let plain = Hdf5Array::parse(&whole, "dataset").unwrap();
+        for length in [512, 1024, 2048, 1 << 20] {
+            let blocked = [vec![7; length], whole.clone()].concat();
+            let read = Hdf5Array::parse(&blocked, "dataset").unwrap();
+            assert_eq!(read, plain);
+        }
+        for length in [1, 256, 513, 1536] {
+            let shifted = [vec![7; length], whole.clone()].concat();
+            assert_eq!(
+                Hdf5Array::parse(&shifted, "dataset"),
+                Err("not an HDF5 file".to_owned())
+            );
+        }
+    }
+}
+
+#[test]
 fn broken_files_are_refused_without_a_panic() {
     let ids: Vec<u8> = (0..70).collect();
     let whole = file(0, 8, (5, 7), &ids, Some((2, 3)));
