@@ -20,6 +20,12 @@ const COLOUR_CHANNELS: [&str; 3] = ["R", "G", "B"];
 /// Lowest sample that is accepted and set to black: filters leave small negative values at edges (chosen).
 const MIN_SAMPLE: f32 = -1e-3;
 
+/// Number of the last compression that the decoder knows, DWAB.
+const LAST_KNOWN_COMPRESSION: u8 = 9;
+
+/// Maximum size of headers that are searched for the name of a compression, in bytes (chosen).
+const MAX_HEADER_BYTES: usize = 1 << 20;
+
 /// Tolerance for primaries that count as BT.709; files state six digits (chosen).
 const PRIMARIES_TOLERANCE: f64 = 1e-4;
 
@@ -42,7 +48,7 @@ impl ExrFile {
     /// # Errors
     /// If they are broken, no layer has the three colour channels as floats, or the image is larger than the rule allows.
     pub(super) fn open(file: &[u8], rule: &DecodeRule) -> Result<Self, String> {
-        let reader = block::read(Cursor::new(file), false).map_err(|e| unreadable(&e))?;
+        let reader = block::read(Cursor::new(file), false).map_err(|e| unreadable(file, &e))?;
         let headers = reader.headers();
         let mut layers = (0..headers.len()).filter(|index| has_colours(&headers[*index]));
         let layer = layers.next().ok_or(
@@ -73,7 +79,7 @@ impl ExrFile {
     /// # Errors
     /// If the file is truncated or damaged, transparent in places, or has a sample that is negative or not finite.
     pub(super) fn light(&self, file: &[u8]) -> Result<Vec<f32>, String> {
-        let reader = block::read(Cursor::new(file), false).map_err(|e| unreadable(&e))?;
+        let reader = block::read(Cursor::new(file), false).map_err(|e| unreadable(file, &e))?;
         let header = &reader.headers()[self.layer];
         let window = header.shared_attributes.display_window;
         let shift = header.own_attributes.layer_position - window.position;
@@ -220,8 +226,32 @@ fn are_bt709(found: &Primaries) -> bool {
         .all(|(found, expected)| (found - expected).abs() <= PRIMARIES_TOLERANCE)
 }
 
-fn unreadable(e: &exr::error::Error) -> String {
-    format!("not a readable OpenEXR image: {}", one_line(e))
+/// Problem of a file whose headers the decoder refuses.
+fn unreadable(file: &[u8], e: &exr::error::Error) -> String {
+    match new_compression(file) {
+        Some(name) => format!(
+            "an OpenEXR image of the compression {name}, which is not read; save it with ZIP or PIZ"
+        ),
+        None => format!("not a readable OpenEXR image: {}", one_line(e)),
+    }
+}
+
+/// The first stated compression that the decoder does not know: one of OpenEXR 3.4 or later.
+fn new_compression(file: &[u8]) -> Option<String> {
+    // Name, type and length of the attribute.
+    const ATTRIBUTE: &[u8] = b"compression\0compression\0\x01\0\0\0";
+    let headers = file.get(..MAX_HEADER_BYTES).unwrap_or(file);
+    let method = headers
+        .windows(ATTRIBUTE.len() + 1)
+        .filter(|part| part.starts_with(ATTRIBUTE))
+        .filter_map(|part| part.last())
+        .find(|method| **method > LAST_KNOWN_COMPRESSION)?;
+    Some(match method {
+        10 | 11 => "HTJ2K".to_owned(),
+        12 => "LJ2K".to_owned(),
+        13 => "ZSTD".to_owned(),
+        other => format!("number {other}"),
+    })
 }
 
 fn one_line(e: &exr::error::Error) -> String {

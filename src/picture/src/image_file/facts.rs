@@ -155,6 +155,11 @@ fn unsupported_tiff(properties: &TiffProperties<'_>) -> Option<String> {
         let problem = "a camera's RAW file: only its preview could be read; develop it to a 16-bit TIFF or PNG first";
         return Some(problem.to_owned());
     }
+    if let Some(compression) = &properties.unread_compression {
+        return Some(format!(
+            "a TIFF of the compression {compression}, which is not read; save it with LZW or deflate first"
+        ));
+    }
     if properties.is_float {
         let problem = "a TIFF of floating-point samples; 8 or 16 bits expected, or OpenEXR for linear light: convert it first";
         return Some(problem.to_owned());

@@ -20,6 +20,7 @@ const MAX_VALUES: u64 = 1 << 20;
 // Tags (TIFF 6.0, appendix A; DNG 1.7).
 const NEW_SUBFILE_TYPE: u16 = 254;
 const BITS_PER_SAMPLE: u16 = 258;
+const COMPRESSION: u16 = 259;
 const PHOTOMETRIC: u16 = 262;
 const STRIP_OFFSETS: u16 = 273;
 const ORIENTATION: u16 = 274;
@@ -48,7 +49,7 @@ pub(super) struct TiffProperties<'a> {
     pub(super) pages: usize,
     /// True for interleaved samples of cyan, magenta, yellow and black with 8 bits each.
     pub(super) is_cmyk: bool,
-    /// Description of an unsupported colour space; `None` for grey, RGB, YCbCr and the inks of `is_cmyk`.
+    /// Description of an unsupported colour space; `None` for grey, RGB and the inks of `is_cmyk`.
     pub(super) colours: Option<&'static str>,
     /// ICC profile, if the file has one.
     pub(super) profile: Option<&'a [u8]>,
@@ -58,6 +59,8 @@ pub(super) struct TiffProperties<'a> {
     pub(super) bits: u64,
     /// True if the samples are floats.
     pub(super) is_float: bool,
+    /// Name of a compression that is not read; `None` for one that is.
+    pub(super) unread_compression: Option<String>,
     /// Byte offset at which the last strip or tile of the first image ends.
     pub(super) end: u64,
 }
@@ -88,6 +91,7 @@ impl<'a> TiffProperties<'a> {
         let is_preview = value(NEW_SUBFILE_TYPE).is_some_and(is_reduced);
         properties.is_raw = is_preview || directory.iter().any(|entry| entry.tag == DNG_VERSION);
         properties.is_float = value(SAMPLE_FORMAT) == Some(FLOAT);
+        properties.unread_compression = value(COMPRESSION).and_then(unread_compression);
         for (offsets, counts) in [
             (STRIP_OFFSETS, STRIP_BYTE_COUNTS),
             (TILE_OFFSETS, TILE_BYTE_COUNTS),
@@ -123,13 +127,33 @@ fn is_copy_or_mask(subfile_type: u64) -> bool {
     subfile_type & 0b101 != 0
 }
 
+/// Name of a compression without a decoder here; `None` for one that is read.
+fn unread_compression(method: u64) -> Option<String> {
+    Some(match method {
+        // In this order: none, fax group 4, LZW, JPEG, deflate, PackBits, deflate by its first number.
+        1 | 4 | 5 | 7 | 8 | 32773 | 32946 => return None,
+        2 | 3 => "fax (CCITT group 3)".to_owned(),
+        6 => "JPEG in the form of TIFF 6.0".to_owned(),
+        33003..=33005 | 34712 => "JPEG 2000".to_owned(),
+        22610 | 34934 => "JPEG XR".to_owned(),
+        34887 => "LERC".to_owned(),
+        34925 => "LZMA".to_owned(),
+        34933 => "PNG".to_owned(),
+        50000 => "ZSTD".to_owned(),
+        50001 => "WebP".to_owned(),
+        50002 | 52546 => "JPEG XL".to_owned(),
+        other => format!("method {other}"),
+    })
+}
+
 /// Description of an unsupported colour space; `None` for a supported one or without the tag.
 fn unsupported_colours(photometric: Option<u64>) -> Option<&'static str> {
     match photometric? {
-        // In this order: grey with 0 as white, grey with 0 as black, RGB, YCbCr.
-        0..=2 | 6 => None,
+        // In this order: grey with 0 as white, grey with 0 as black, RGB.
+        0..=2 => None,
         3 => Some("a TIFF of palette colours"),
         4 => Some("a mask"),
+        6 => Some("a TIFF of YCbCr colours"),
         SEPARATED => Some("a CMYK image of another form than four inks of 8 bits, pixel by pixel"),
         8..=10 => Some("a Lab image"),
         32803 | 34892 => Some("a camera's RAW file"),

@@ -7,6 +7,7 @@ use darkqa_picture::ImageFile;
 use image::{ImageFormat, Rgb, RgbImage};
 use serde_json::json;
 
+use crate::support::exr_files::exr;
 use crate::support::image_files::{
     animated_webp, chunk, encoded, png, seen, turned_webp, webp_of, webp_samples, with_chunks,
 };
@@ -194,6 +195,7 @@ fn unsupported_images_are_refused_by_name() {
             "a CMYK image of another form than four inks of 8 bits, pixel by pixel; convert it to RGB first",
         ),
         (rgb(262, 3), "palette colours; convert it"),
+        (rgb(262, 6), "a TIFF of YCbCr colours; convert it"),
         (rgb(262, 8), "a Lab image; convert it"),
         (rgb(254, 1), "a camera's RAW file: only its preview"),
         (rgb(50706, 1), "a camera's RAW file: only its preview"),
@@ -214,6 +216,49 @@ fn unsupported_images_are_refused_by_name() {
     ] {
         let error = fault(bytes);
         assert!(error.contains(says), "{error}");
+    }
+}
+
+/// What newer writers save, with the way out. The pixels behind the header do not matter.
+#[test]
+fn unread_compressions_are_named() {
+    let tiff_of = |method| tiff(Order::Little, &[Page::rgb(&image()).with(259, method)]);
+    for (method, name) in [
+        (50000, "ZSTD"),
+        (50001, "WebP"),
+        (50002, "JPEG XL"),
+        (34887, "LERC"),
+        (34925, "LZMA"),
+        (34712, "JPEG 2000"),
+        (61234, "method 61234"),
+    ] {
+        let error = fault(tiff_of(method));
+        let expected = format!(
+            "a TIFF of the compression {name}, which is not read; save it with LZW or deflate first"
+        );
+        assert!(error.ends_with(&expected), "{error}");
+    }
+    assert_eq!(decoded(tiff_of(1)), image());
+    let attribute = b"compression\0compression\0\x01\0\0\0";
+    let light: Vec<f32> = (0..7 * 4 * 3).map(|at| at as f32 / 100.0).collect();
+    let mut exr = exr([7, 4], &light);
+    let at = exr
+        .windows(attribute.len())
+        .position(|part| part == attribute);
+    let at = at.unwrap() + attribute.len();
+    for (method, name) in [
+        (10, "HTJ2K"),
+        (11, "HTJ2K"),
+        (12, "LJ2K"),
+        (13, "ZSTD"),
+        (77, "number 77"),
+    ] {
+        exr[at] = method;
+        let error = fault(exr.clone());
+        let expected = format!(
+            "an OpenEXR image of the compression {name}, which is not read; save it with ZIP or PIZ"
+        );
+        assert!(error.ends_with(&expected), "{error}");
     }
 }
 
