@@ -5,8 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::frames::MissingFiles;
 use super::image_paths::{ImagePaths, is_image};
-use super::import_hint::with_import_hint;
-use super::ready_made::extraction_advice;
+use super::import_hint::{is_lerobot_set, with_import_hint};
 use super::{DataPlace, Dataset, Root, SetArgs, frames, stem};
 use crate::error::{Error, Result};
 use crate::picture::image_file::format::SUPPORTED_FORMATS;
@@ -27,32 +26,46 @@ impl Photographs {
     /// - A folder with a `frames.jsonl`: the frames in it.
     /// - Any other folder: all images in it and in its subfolders, named by their relative paths. Hidden files are skipped.
     /// - An image file: this image.
-    /// - The built-in rooms and ready-made sets: their images.
+    /// - The built-in rooms and ready-made sets: their images. A folder of Parquet files without other images is such a set.
     ///
     /// # Errors
     /// If the place cannot be read, or has no image.
     pub(crate) fn open(place: &DataPlace, set: &SetArgs) -> Result<Self> {
+        Self::open_place(place, set).map_err(|e| with_import_hint(place.path(), e))
+    }
+
+    fn open_place(place: &DataPlace, set: &SetArgs) -> Result<Self> {
         let dataset = match place {
             DataPlace::Rooms(rooms) => Dataset::from_rooms(*rooms),
-            DataPlace::Path(path) if path.is_dir() => {
-                return Self::open_folder(path, set).map_err(|e| with_import_hint(Some(path), e));
-            }
+            DataPlace::Path(path) if path.is_dir() => return Self::open_folder(path, set),
             DataPlace::Path(path) if is_image(path) => Dataset::from_images(path, &[])?,
             DataPlace::Path(_) | DataPlace::Files(_) | DataPlace::Known { .. } => {
-                let set = Dataset::open(place, None, set)?;
-                let count = set.questions().len();
-                let note = format!(
-                    "{place}: its own questions ({count}) are ignored, and those of --ask are asked about its images"
-                );
-                return Ok(Self {
-                    dataset: set.with_questions(Vec::new()),
-                    notes: vec![note],
-                });
+                return Self::open_set(place, set);
             }
         };
         Ok(Self {
             dataset,
             notes: Vec::new(),
+        })
+    }
+
+    /// The images of a ready-made set, whose rows need no questions.
+    fn open_set(place: &DataPlace, set: &SetArgs) -> Result<Self> {
+        let set = SetArgs {
+            images_alone: true,
+            ..set.clone()
+        };
+        let dataset = Dataset::open_place(place, None, &set)?;
+        let images = counted(dataset.frames().count(), "image");
+        let note =
+            format!("{place}: {images}; questions in it are ignored, and those of --ask are asked");
+        Ok(Self {
+            dataset: Dataset {
+                questions: Vec::new(),
+                summary: Vec::new(),
+                ..dataset
+            },
+            notes: vec![note],
         })
     }
 
@@ -74,11 +87,10 @@ impl Photographs {
         let root = Root::new(folder, further)?;
         let mut scan = Scan::default();
         scan.add_folder(&root, folder)?;
-        let parquet = scan.files.iter().find(|path| {
+        let has_parquet = scan.files.iter().any(|path| {
             path.extension()
                 .is_some_and(|name| name.eq_ignore_ascii_case("parquet"))
         });
-        let parquet = parquet.and_then(|path| Some(extraction_advice(path.parent()?)));
         let found = ImagePaths::from_paths(scan.files);
         let mut sources = BTreeMap::new();
         for path in &found.images {
@@ -90,14 +102,15 @@ impl Photographs {
                 .collect();
             frames::insert_image(&mut sources, parts.join("/"), path)?;
         }
+        if sources.is_empty() && has_parquet && !is_lerobot_set(folder) {
+            return Self::open_set(&DataPlace::Path(folder.to_owned()), set);
+        }
         if sources.is_empty() {
             let unread = found
                 .unsupported_note()
                 .map_or(String::new(), |unread| format!("; {unread}"));
-            let parquet = parquet.map_or_else(String::new, |advice| "; ".to_owned() + &advice);
-            let problem = format_args!(
-                "no {SUPPORTED_FORMATS} image in this folder or below{unread}{parquet}"
-            );
+            let problem =
+                format_args!("no {SUPPORTED_FORMATS} image in this folder or below{unread}");
             return Err(Error::data(folder.display(), problem));
         }
         found.warn_of_unsupported(folder);

@@ -75,17 +75,8 @@ pub(super) fn items(
 ) -> Result<Vec<Item>, String> {
     let mut cutter = InstructionCutter((!args.keep_instructions).then_some(cut));
     let (mut items, mut interner) = (Vec::new(), OptionInterner::default());
-    for (index, row) in table.rows.iter().enumerate() {
-        let image_count = form.in_row(row, roles).len();
-        let reason = match (image_count, args.multi_image) {
-            (0, _) => Some(OmissionReason::NoImage),
-            (1, _) | (_, Some(SeveralImages::Send)) => None,
-            (_, Some(SeveralImages::Skip) | None) => Some(OmissionReason::SeveralImages),
-        };
-        if let Some(reason) = reason {
-            omissions.add(reason, || format!("{image_count} images"));
-            continue;
-        }
+    for (index, image_count) in rows_with_images(table, roles, form, args, omissions) {
+        let row = &table.rows[index];
         match question_parts(row, roles, ImageMarks::new(image_count), &mut cutter) {
             Ok(QuestionParts {
                 text,
@@ -108,6 +99,30 @@ pub(super) fn items(
         }
     }
     Ok(items)
+}
+
+/// The rows with an image, or with several that may be sent, and the number of images of each. Counts the other rows in `omissions`.
+pub(super) fn rows_with_images(
+    table: &Table,
+    roles: &Roles,
+    form: ImageForm,
+    args: &SetArgs,
+    omissions: &mut Omissions,
+) -> Vec<(usize, usize)> {
+    let mut rows = Vec::with_capacity(table.rows.len());
+    for (index, row) in table.rows.iter().enumerate() {
+        let image_count = form.in_row(row, roles).len();
+        let reason = match (image_count, args.multi_image) {
+            (0, _) => Some(OmissionReason::NoImage),
+            (1, _) | (_, Some(SeveralImages::Send)) => None,
+            (_, Some(SeveralImages::Skip) | None) => Some(OmissionReason::SeveralImages),
+        };
+        match reason {
+            Some(reason) => omissions.add(reason, || format!("{image_count} images")),
+            None => rows.push((index, image_count)),
+        }
+    }
+    rows
 }
 
 /// The question and the options of a row, as in [`Item`].

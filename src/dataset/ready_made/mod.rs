@@ -31,10 +31,10 @@ use super::family::{check_family, unnamed};
 use super::image_source::ImageSource;
 use super::root::Root;
 use crate::error::{Error, Result};
-use crate::types::{Family, FrameId, Question};
+use crate::types::{Choices, Family, FrameId, Question};
 
 pub(super) use choices::one_line;
-pub(super) use container::{Archive, extraction_advice, is_set_folder};
+pub(super) use container::{Archive, is_set_folder};
 pub(crate) use container::{ParquetColumns, cached_snapshot, refuse_lfs_pointer};
 pub(crate) use omissions::SkipBad;
 pub(super) use pictures::{EmbeddedImage, SceneNames, Series};
@@ -46,11 +46,11 @@ use cells::{Cell, Table};
 use choices::{ParsedQuestion, find_truths, is_native_format};
 use columns::map::{CellFormat, ColumnMap};
 use columns::names::Role;
-use columns::{FamilySource, QuestionSource, Roles};
+use columns::{FamilySource, ImageColumns, QuestionSource, Roles};
 use container::{FoundFiles, Joined, SetFile};
 use folder_info::FolderInfo;
 use groups::{GroupRule, Groups};
-use items::{InstructionCounts, items};
+use items::{InstructionCounts, items, rows_with_images};
 use omissions::{OmissionReason, Omissions, omit_contradictions};
 use pictures::{Frames, Ids, ImageForm, Scenes};
 use summary::Summary;
@@ -431,6 +431,9 @@ fn parse_rows(
     if table.rows.is_empty() {
         return Err("no questions in it".to_owned());
     }
+    if args.images_alone {
+        return parse_images(table, map, args, form);
+    }
     let roles = Roles::new(table, map)?;
     let rule = GroupRule::from_map(table, map)?;
     let (mut omissions, mut cut_instructions) = (Omissions::default(), InstructionCounts::new());
@@ -474,11 +477,49 @@ fn parse_rows(
     Ok((roles, set))
 }
 
-/// Adds the columns and an example of `--map image=…` to a problem, if no row has an image; or how to take out images without questions.
-fn with_image_hint(table: &Table, roles: &Roles, problem: String) -> String {
-    if let (QuestionSource::Image, Some(advice)) = (&roles.question, columns::images_alone(table)) {
-        return format!("{problem}; {advice}");
+/// Finds the images of the rows. Each row with an image has a question that is not asked.
+fn parse_images(
+    table: &Table,
+    map: &ColumnMap,
+    args: &SetArgs,
+    form: ImageForm,
+) -> Result<(Roles, ParsedSet), String> {
+    let mut roles = Roles::with_question(table, map, QuestionSource::Image)?;
+    let is_named = map.entry(Role::Image).is_some()
+        || table
+            .rows
+            .iter()
+            .any(|row| !pictures::images(row, &roles).is_empty());
+    if let Some(column) = columns::embedded_images(table).filter(|_| !is_named) {
+        roles.images = ImageColumns::First(vec![column]);
     }
+    let mut omissions = Omissions::default();
+    let rows = rows_with_images(table, &roles, form, args, &mut omissions);
+    omissions
+        .check(table.rows.len(), args)
+        .map_err(|problem| with_image_hint(table, &roles, problem))?;
+    let choices = Choices::without_truth(vec!["yes".to_owned(), "no".to_owned()])
+        .map_err(|e| e.to_string())?;
+    let questions = rows
+        .into_iter()
+        .map(|(row, _)| ParsedQuestion {
+            row,
+            text: row.to_string(),
+            choices: choices.clone(),
+        })
+        .collect();
+    let set = ParsedSet {
+        questions,
+        answer_columns: Vec::new(),
+        cut_instructions: InstructionCounts::new(),
+        omissions,
+        groups: Groups::default(),
+    };
+    Ok((roles, set))
+}
+
+/// Adds the columns and an example of `--map image=…` to a problem, if no row has an image.
+fn with_image_hint(table: &Table, roles: &Roles, problem: String) -> String {
     let has_images = table
         .rows
         .iter()

@@ -21,6 +21,9 @@ pub struct SetArgs {
     /// The configuration that the rules of that set name.
     #[arg(skip)]
     pub preset_config: Option<String>,
+    /// Read only the images: no row needs a question, options or an answer.
+    #[arg(skip)]
+    pub images_alone: bool,
     /// Configuration of a repository, or all; default: the default of its card
     #[arg(long, value_name = "NAME|all", add = Decides::Reply)]
     pub config_name: Option<String>,

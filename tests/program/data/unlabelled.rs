@@ -417,7 +417,7 @@ fn rooms_and_sets_work_without_labels() {
         called.stderr
     };
     insta::assert_snapshot!(redacted(&call("set.jsonl", "one")), @"
-    set.jsonl: its own questions (1) are ignored, and those of --ask are asked about its images
+    set.jsonl: 1 image; questions in it are ignored, and those of --ask are asked
     --ask home:uncertain: 2 questions about 1 image without answers (2 each); each model is compared with its own
         answers at L0, and is asked without images, too
      WARN --ask home:uncertain: with one image, nothing shows that an answer depends on the image; name a folder

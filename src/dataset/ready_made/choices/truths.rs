@@ -9,9 +9,7 @@ use super::option_list::OptionList;
 use crate::dataset::ready_made::cells::{Cell, Table};
 use crate::dataset::ready_made::columns::map::{CellFormat, map_flag};
 use crate::dataset::ready_made::columns::names::Role;
-use crate::dataset::ready_made::columns::{
-    Column, QuestionSource, Roles, answer_column, describe_columns, images_alone,
-};
+use crate::dataset::ready_made::columns::{Column, Roles, answer_column, describe_columns};
 use crate::dataset::ready_made::items::{AnswerCell, Item};
 use crate::dataset::ready_made::omissions::{OmissionReason, Omissions};
 use crate::types::Choices;
@@ -51,14 +49,9 @@ pub(in crate::dataset::ready_made) fn find_truths(
     omissions: &mut Omissions,
 ) -> Result<Truths, String> {
     if roles.answers.is_empty() && items.iter().all(|item| item.options.is_none()) {
-        let is_asked_in_image = matches!(roles.question, QuestionSource::Image);
-        let images_alone = images_alone(table).filter(|_| is_asked_in_image);
-        let advice = images_alone.unwrap_or_else(|| {
-            "--ask FILE asks questions without answers about every image".to_owned()
-        });
         return Err(format!(
             "neither options nor answers among its columns: --map options=COLUMN,answer=COLUMN names them, and --map answer=COLUMN \
-             those of yes/no questions; {advice}. Its columns:\n{}",
+             those of yes/no questions; --ask FILE asks questions without answers about every image. Its columns:\n{}",
             describe_columns(table)
         ));
     }

@@ -11,6 +11,6 @@ mod template;
 pub(super) use column::Column;
 pub(super) use family_source::FamilySource;
 pub(super) use roles::{
-    ImageColumns, OptionsInQuestion, QuestionSource, Roles, describe_columns, find_column,
-    images_alone,
+    ImageColumns, OptionsInQuestion, QuestionSource, Roles, describe_columns, embedded_images,
+    find_column,
 };

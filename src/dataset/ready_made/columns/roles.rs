@@ -7,7 +7,6 @@ use super::map::{CellFormat, ColumnMap, map_flag};
 use super::names::{Role, known_names, normalize};
 use super::template::Template;
 use crate::dataset::ready_made::cells::{Cell, ConversationPaths, Table};
-use crate::dataset::ready_made::container::extraction_advice;
 use crate::types::Choices;
 use crate::types::questions::letter;
 use crate::types::text::excerpt;
@@ -107,6 +106,18 @@ impl Roles {
             (None, Some(_)) => QuestionSource::Image,
             (None, None) => return Err(no_question(table, map)?),
         };
+        Self::with_question(table, map, question)
+    }
+
+    /// Assigns roles to the columns of a table whose question comes from elsewhere.
+    ///
+    /// # Errors
+    /// If a column of the map does not exist.
+    pub(in crate::dataset::ready_made) fn with_question(
+        table: &Table,
+        map: &ColumnMap,
+        question: QuestionSource,
+    ) -> Result<Self, String> {
         let options_entry = map.entry(Role::Options);
         let options = columns_of(table, map, Role::Options)?;
         let (option_lists, option_cells) = match options_entry {
@@ -276,7 +287,7 @@ fn likely_question_column(table: &Table) -> Option<&String> {
 
 /// Error message for a table without a question column, with the `--map` flag that most likely helps.
 fn no_question(table: &Table, map: &ColumnMap) -> Result<String, String> {
-    let images_alone = images_alone(table);
+    let has_images = embedded_images(table).is_some();
     let [options, answers] = [Role::Options, Role::Answer].map(|role| columns_of(table, map, role));
     let is_unanswerable = options?.is_empty() && answers?.is_empty();
     let remedy = match (
@@ -295,9 +306,8 @@ fn no_question(table: &Table, map: &ColumnMap) -> Result<String, String> {
             map_flag(Role::Question, name, None),
             map_flag(Role::Question, "", None)
         ),
-        (None, None) if is_unanswerable && images_alone.is_some() => {
-            "say which is which: --map question=COLUMN,image=COLUMN,options=COLUMN,answer=COLUMN"
-                .to_owned()
+        (None, None) if is_unanswerable && has_images => {
+            "--ask home asks questions of its own about the images".to_owned()
         }
         (None, None) => format!(
             "if the question stands in the image, {} asks {:?}; else say which is which: --map question=COLUMN,image=COLUMN,options=COLUMN,answer=COLUMN",
@@ -305,30 +315,24 @@ fn no_question(table: &Table, map: &ColumnMap) -> Result<String, String> {
             QuestionSource::IN_IMAGE_TEXT
         ),
     };
-    let extraction = images_alone.map_or_else(String::new, |advice| "; ".to_owned() + &advice);
     Ok(format!(
-        "no question among its columns:\n{}\n {remedy}{extraction}",
+        "no question among its columns:\n{}\n {remedy}",
         describe_columns(table)
     ))
 }
 
-/// Advice for a Parquet table with images in its cells, whose images alone may be wanted; `None` for other tables.
-pub(in crate::dataset::ready_made) fn images_alone(table: &Table) -> Option<String> {
-    let file = &table.files.first()?.path;
-    let is_parquet = file
-        .extension()
-        .is_some_and(|name| name.eq_ignore_ascii_case("parquet"));
-    let row = table.rows.first()?;
-    let has_images = (0..table.columns.len()).any(|index| match row.cell(index) {
+/// A column with images in its cells.
+pub(in crate::dataset::ready_made) fn embedded_images(table: &Table) -> Option<Column> {
+    let is_image = |cell: &Cell| match cell {
         Cell::Bytes(_) | Cell::File(_) => true,
         Cell::Fields(fields) => fields.iter().any(|(name, _)| &**name == "bytes"),
         _ => false,
-    });
-    let place = match (&table.files[..], file.parent()) {
-        ([_, _, ..], Some(folder)) => folder,
-        _ => file,
     };
-    (is_parquet && has_images).then(|| extraction_advice(place))
+    let index = table
+        .rows
+        .iter()
+        .find_map(|row| (0..table.columns.len()).find(|index| is_image(row.cell(*index))))?;
+    Some(Column::new(index, &table.columns[index]))
 }
 
 /// Finds a column by its name, or a field of the structs in a column, such as `meta.source`.

@@ -36,17 +36,6 @@ pub(crate) use tree::cached_snapshot;
 const SUPPORTED: &str =
     ".parquet, .tsv, .csv, .jsonl, .ndjson or .json (the texts also as .gz), or a .zip of these";
 
-/// Python program that writes the images of a Parquet file, or of a folder of them, into the folder `images`.
-const EXTRACT_IMAGES: &str = "import sys, pyarrow.parquet as p; t = p.read_table(sys.argv[1]); c = [n for n in t.column_names if 'binary' in str(t.schema.field(n).type)][0]; [open(f'images/{i:06}.' + ('png' if b[1:4] == b'PNG' else 'jpg'), 'wb').write(b) for i, b in enumerate(r if isinstance(r, bytes) else r['bytes'] for r in t[c].to_pylist() if r)]";
-
-/// Advice for a Parquet file, or a folder of them, whose images alone are wanted.
-pub(in crate::dataset) fn extraction_advice(place: &Path) -> String {
-    format!(
-        "to ask questions of your own (--ask) about its images, extract the images into a folder: mkdir images && python -c \"{EXTRACT_IMAGES}\" {}; then --data images",
-        shell_word(&place.to_string_lossy())
-    )
-}
-
 /// One file of a table.
 #[derive(Debug)]
 pub(in crate::dataset) struct SetFile {
