@@ -7,6 +7,7 @@ use super::container::Archive;
 use crate::dataset::root::Root;
 use crate::error::{Error, Result};
 use crate::files::reading;
+use crate::types::SetLight;
 
 /// The fields that are read from `dataset.json`.
 #[derive(Debug, Default)]
@@ -40,12 +41,6 @@ impl FolderInfo {
         let text = archive.read_text(Self::FILE)?;
         let info: serde_json::Value =
             serde_json::from_str(&text).map_err(|e| Error::data(path.display(), e))?;
-        if info.get("light").is_some_and(|light| light != "lit") {
-            tracing::warn!(
-                "{}: `light` is not read from a ZIP file; --light dark says that the set was photographed in the dark",
-                path.display()
-            );
-        }
         Self::read(&path, &info)
     }
 
@@ -58,6 +53,21 @@ impl FolderInfo {
             name: text_field(info, "name").unwrap_or_default().to_owned(),
             map,
         })
+    }
+}
+
+/// Light in which the photographs of a ZIP file were taken, from its `dataset.json`; lit by default.
+pub(in crate::dataset) fn light_of_archive(path: &Path) -> Result<SetLight> {
+    let archive = Archive::open(path)?;
+    if !archive.has(FolderInfo::FILE) {
+        return Ok(SetLight::Lit);
+    }
+    let wrong = |e| Error::data(path.join(FolderInfo::FILE).display(), e);
+    let text = archive.read_text(FolderInfo::FILE)?;
+    let mut info: serde_json::Value = serde_json::from_str(&text).map_err(wrong)?;
+    match info.get_mut("light") {
+        Some(light) => serde_json::from_value(light.take()).map_err(wrong),
+        None => Ok(SetLight::Lit),
     }
 }
 

@@ -36,6 +36,7 @@ use crate::types::{Choices, Family, FrameId, Question};
 pub(super) use choices::one_line;
 pub(super) use container::{Archive, is_set_folder};
 pub(crate) use container::{ParquetColumns, cached_snapshot, refuse_lfs_pointer};
+pub(super) use folder_info::light_of_archive;
 pub(crate) use omissions::SkipBad;
 pub(super) use pictures::{EmbeddedImage, SceneNames, Series};
 pub(super) use preset::{is_known as is_known_set, names as known_sets};

@@ -1,6 +1,8 @@
 //! Photographs in the dark: beside their frames, sets that are dark from the start, pairs in two folders, and classes by folder.
 
+use std::collections::BTreeSet;
 use std::fs;
+use std::io::{Cursor, Write as _};
 
 use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::run::{Bench, Called, assert_same_products, model_args, records, words};
@@ -593,4 +595,38 @@ fn folders_of_classes_have_one_question() {
     L0: the same bytes as were sent ([DIGEST])
       random: ✗ wrong: "B"
     "#);
+}
+
+#[test]
+fn light_of_a_zip_file_is_read() {
+    let bench = Bench::new();
+    let mut image = Cursor::new(Vec::new());
+    darker(&scene(1), 4.0)
+        .write_to(&mut image, image::ImageFormat::Png)
+        .unwrap();
+    let question =
+        json!({"question": "Is it red?", "choices": ["yes", "no"], "answer": 0, "image": "1.png"});
+    let mut zip = zip::ZipWriter::new(Cursor::new(Vec::new()));
+    for (name, bytes) in [
+        ("q.jsonl", question.to_string().as_bytes()),
+        ("1.png", image.get_ref()),
+        (
+            "dataset.json",
+            br#"{"schema": "darkqa.dataset/1", "light": "dark"}"#,
+        ),
+    ] {
+        zip.start_file(name, zip::write::SimpleFileOptions::default())
+            .unwrap();
+        zip.write_all(bytes).unwrap();
+    }
+    bench.file("set.zip", zip.finish().unwrap().into_inner());
+    for (flags, expected) in [("", 1), (" --light lit --levels L0,L3 --variant ev", 2)] {
+        let line = format!("--data set.zip --model random --out run{expected}{flags}");
+        bench.complete(&words(&line));
+        let conditions: BTreeSet<String> = records(&bench.path(&format!("run{expected}")))
+            .iter()
+            .map(|record| record["condition"].to_string())
+            .collect();
+        assert_eq!(conditions.len(), expected, "{conditions:?}");
+    }
 }
