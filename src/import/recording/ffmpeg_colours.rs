@@ -131,10 +131,20 @@ impl FrameColours {
                 filtered("setparams=color_trc=arib-std-b67")
             ),
             // Linear and logarithmic codes, which the filter knows.
-            8..=10 => format!(
-                "{problem}; convert the video first, by an ffmpeg with zscale: {}",
-                filtered("zscale=transfer=709:primaries=709:matrix=709")
-            ),
+            8..=10 => {
+                // The filter converts only from colours that are stated.
+                let mut filter = "zscale=transfer=709:primaries=709:matrix=709".to_owned();
+                for (stated, key) in [(&self.primaries, "primariesin"), (&self.matrix, "matrixin")]
+                {
+                    if stated == "unknown" {
+                        filter.extend([":", key, "=709"]);
+                    }
+                }
+                format!(
+                    "{problem}; convert the video first, by an ffmpeg with zscale: {}",
+                    filtered(&filter)
+                )
+            }
             _ => format!("{problem}; convert the video to BT.709 first"),
         })
     }

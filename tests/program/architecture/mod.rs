@@ -15,6 +15,7 @@ use std::sync::LazyLock;
 
 use files::Files;
 use map::Map;
+use source::Kind;
 
 /// The crates that the program uses, by the names of their modules at its root, or by their own names without `darkqa_`.
 const CRATES: [&str; 11] = [
@@ -158,6 +159,21 @@ static MEMBER_FILES: LazyLock<Vec<Files>> = LazyLock::new(|| {
 /// The files of each crate.
 fn crates() -> impl Iterator<Item = &'static Files> {
     std::iter::once(&*FILES).chain(&*MEMBER_FILES)
+}
+
+/// The texts outside of tests in folders or files of `src/`, given by the start of their paths, each with its file and line.
+pub(crate) fn texts(places: &[&str]) -> Vec<(String, String)> {
+    crates()
+        .flat_map(Files::parts_outside_tests)
+        .filter(|(_, part)| matches!(part.kind, Kind::Text))
+        .filter(|(source, _)| places.iter().any(|place| source.path.starts_with(place)))
+        .map(|(source, part)| {
+            (
+                format!("src/{}:{}", source.path, part.line),
+                part.names.concat(),
+            )
+        })
+        .collect()
 }
 
 fn src() -> PathBuf {

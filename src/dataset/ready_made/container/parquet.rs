@@ -23,6 +23,7 @@ use super::json_scan::MAX_ROW_BYTES;
 use crate::error::{Error, Result};
 use crate::files::guarded::guarded;
 use crate::files::reading;
+use crate::types::shell_word;
 
 /// Rows that are decoded together; the images of all of them are in memory at once.
 const BATCH_ROWS: usize = 8;
@@ -166,9 +167,9 @@ pub(super) fn check_codecs(path: &Path, footer: &ParquetMetaData) -> Result<()> 
         );
         if !is_supported {
             let problem = format!(
-                "the column {:?} is compressed by {codec}, which is not read; write the file again: python -c \"import pyarrow.parquet as p; p.write_table(p.read_table('{}'), 'again.parquet')\"",
+                "the column {:?} is compressed by {codec}, which is not read; write it again, as again.parquet: python -c \"import sys, pyarrow.parquet as p; p.write_table(p.read_table(sys.argv[1]), 'again.parquet')\" {}",
                 column.column_path().string(),
-                path.display()
+                shell_word(&path.to_string_lossy())
             );
             return Err(Error::data(path.display(), problem));
         }

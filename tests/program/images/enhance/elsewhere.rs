@@ -210,4 +210,9 @@ fn images_of_other_sources_are_refused() {
         frames (-0.01 of the edges agree, 1 at best); check that each has the name of its own dark image; --allow
         bad-enhancer uses them anyway
     ");
+    ask(
+        &bench,
+        "--enhanced mine=made --allow bad-enhancer --out run",
+    )
+    .ended(0);
 }

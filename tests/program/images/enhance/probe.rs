@@ -117,7 +117,7 @@ fn impossible_enhancement_stops_the_run() {
         assert!(called.stderr.contains(seen), "{seen}: {called:?}");
         assert!(called.stderr.contains("--allow bad-enhancer"), "{called:?}");
         // It is not asked about, but it can be.
-        let called = ask(&bench, "--llie-anyway");
+        let called = ask(&bench, "--allow bad-enhancer");
         assert_eq!(called.code, Some(0), "{called:?}");
         assert!(
             called.stdout.contains("because of --allow bad-enhancer"),
