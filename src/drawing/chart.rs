@@ -62,11 +62,21 @@ impl LineStyle {
     /// Style of the model that `--reference` draws in black.
     pub(crate) const BLACK: Self = Self(1000);
 
+    /// Style of a curve of a built-in reference model, such as the observer. References differ by dash and marker.
+    pub(crate) fn built_in(index: usize) -> Self {
+        Self(Self::BLACK.0 + 1 + index)
+    }
+
+    /// True if the line is drawn in the colour of axes and text, or in black.
+    pub(crate) fn is_ink(self) -> bool {
+        self == Self::REFERENCE || self.0 >= Self::BLACK.0
+    }
+
     /// Colour of the line, as red, green and blue.
     pub(crate) fn rgb(self) -> [u8; 3] {
         match self {
-            Self::REFERENCE => INK,
             Self::BLACK => [0; 3],
+            _ if self.is_ink() => INK,
             Self(number) => COLOURS[number % COLOURS.len()],
         }
     }

@@ -4,7 +4,7 @@
 use std::fmt::{self, Write as _};
 
 use crate::sentences::{Sentence, capitalised};
-use crate::text::words::{percent, points};
+use crate::text::words::{percent, points, share_ends};
 
 /// Title of a group, and the kinds of sentences that belong to it.
 struct GroupKinds {
@@ -144,22 +144,26 @@ impl<'a> FindingGroups<'a> {
     }
 
     /// Summary of the report in one sentence: the effect of darkness, and the detected effects of enhancers. Without either, it is the
-    /// first main finding; without any finding, it is empty.
+    /// first main finding; without any finding, it is empty. A sentence about the training data of each enhancer with an effect follows.
     pub(super) fn summary(&self) -> String {
         let darkness = self
             .group("Darkness")
             .and_then(FindingGroup::main_finding)
-            .map(Finding::text);
-        let enhancers = self.group("Enhancers").map(FindingGroup::enhancer_effects);
+            .map(Finding::claims);
+        let enhancers = self.group("Enhancers");
         let clauses: Vec<String> = darkness
             .into_iter()
-            .chain(enhancers)
+            .chain(enhancers.map(FindingGroup::enhancer_effects))
             .filter(|clause| !clause.is_empty())
             .collect();
         match (&clauses[..], self.main_findings().first()) {
             ([], Some((_, first))) => self.sentence(&[first.text()]),
             ([], None) => String::new(),
-            _ => self.sentence(&clauses),
+            _ => {
+                let trainings = enhancers.map_or_else(Vec::new, FindingGroup::trainings);
+                let sentences = std::iter::once(self.sentence(&clauses)).chain(trainings);
+                sentences.collect::<Vec<String>>().join(" ")
+            }
         }
     }
 
@@ -210,15 +214,20 @@ impl<'a> FindingGroup<'a> {
             .filter(|(_, finding)| kinds.leading.contains(&finding.kind()))
             .map(|(index, _)| index)
             .collect();
-        let detected = leading.iter().find(|index| findings[**index].is_detected());
+        let detected = leading
+            .iter()
+            .copied()
+            .find(|index| findings[*index].is_detected());
+        let first = detected.or(leading.first().copied());
         Self {
             title: kinds.title,
-            first: detected.or(leading.first()).copied(),
+            first: first.map(|first| strongest(&findings, first)),
             findings,
         }
     }
 
-    /// The first detected finding of a leading kind, else the first one; `None` without a finding of a leading kind.
+    /// The first detected finding of a leading kind, else the first one; of several enhancers the one with the largest effect. `None`
+    /// without a finding of a leading kind.
     fn main_finding(&self) -> Option<&Finding<'a>> {
         Some(&self.findings[self.first?])
     }
@@ -230,28 +239,61 @@ impl<'a> FindingGroup<'a> {
             .flat_map(|finding| finding.sentences.iter().copied())
     }
 
+    /// Findings about the enhancers, of the kind of the main finding.
+    fn of_main_kind(&self) -> Vec<&Finding<'a>> {
+        let kind = self.main_finding().map(Finding::kind);
+        self.findings
+            .iter()
+            .filter(|finding| Some(finding.kind()) == kind)
+            .collect()
+    }
+
+    /// Findings in the summary: the largest detected effects, or the effect of the only enhancer.
+    fn in_summary(&self) -> Vec<&Finding<'a>> {
+        let mut findings = self.of_main_kind();
+        if findings.len() > 1 {
+            findings.retain(|finding| finding.is_detected());
+            findings.sort_by(|one, other| other.size().total_cmp(&one.size()));
+            findings.truncate(MAX_ENHANCERS);
+        }
+        findings
+    }
+
     /// Detected effects of the enhancers, or the statement that none was detected.
     fn enhancer_effects(&self) -> String {
-        let Some(first) = self.main_finding() else {
-            return String::new();
-        };
-        let findings: Vec<&Finding<'_>> = self
-            .findings
-            .iter()
-            .filter(|finding| finding.kind() == first.kind())
-            .collect();
-        let detected: Vec<String> = findings
-            .iter()
-            .filter(|finding| finding.is_detected())
-            .take(MAX_ENHANCERS)
-            .map(|finding| finding.text())
-            .collect();
-        match findings.len() {
-            _ if !detected.is_empty() => detected.join("; "),
-            1 => first.text(),
-            count => format!("no effect of the {count} enhancers was detected"),
+        let claims: Vec<String> = self.in_summary().into_iter().map(Finding::claims).collect();
+        match self.of_main_kind().len() {
+            count if count > 0 && claims.is_empty() => {
+                format!("no effect of the {count} enhancers was detected")
+            }
+            _ => claims.join("; "),
         }
     }
+
+    /// Sentences about the training data of the enhancers in the summary.
+    fn trainings(&self) -> Vec<String> {
+        self.in_summary()
+            .into_iter()
+            .map(|finding| finding.main_sentence().scope.training.clone())
+            .filter(|training| !training.is_empty())
+            .collect()
+    }
+}
+
+/// Index of the finding with the largest effect among those that are about the same kind of effect as the finding `first` and as
+/// detected as it, but about other enhancers; `first` if it is not about an enhancer.
+fn strongest(findings: &[Finding<'_>], first: usize) -> usize {
+    let is_alike = |finding: &Finding<'_>| {
+        let sentence = finding.main_sentence();
+        sentence.scope.subject.is_some()
+            && finding.kind() == findings[first].kind()
+            && finding.is_detected() == findings[first].is_detected()
+    };
+    (0..findings.len())
+        .filter(|index| is_alike(&findings[*index]))
+        .rev()
+        .max_by(|one, other| findings[*one].size().total_cmp(&findings[*other].size()))
+        .unwrap_or(first)
 }
 
 /// True if a group lists a kind of sentence.
@@ -297,8 +339,23 @@ impl<'a> Finding<'a> {
             .unwrap_or(self.sentences[0])
     }
 
-    /// Text of the detected effects in the variant of [`Self::main_sentence`], without a full stop.
+    /// Size of the effect of the main sentence in points; 0 without one.
+    fn size(&self) -> f64 {
+        let difference = self.main_sentence().values.get("difference");
+        difference.map_or(0.0, |difference| difference.abs())
+    }
+
+    /// Text of the detected effects in the variant of [`Self::main_sentence`] and the sentence about training data, without the last full
+    /// stop.
     pub(super) fn text(&self) -> String {
+        match self.main_sentence().scope.training.trim_end_matches('.') {
+            "" => self.claims(),
+            training => format!("{}. {training}", self.claims()),
+        }
+    }
+
+    /// Text of the detected effects in the variant of [`Self::main_sentence`], without a full stop.
+    fn claims(&self) -> String {
         let main = self.main_sentence();
         let mut texts: Vec<&str> = self
             .sentences
@@ -314,7 +371,7 @@ impl<'a> Finding<'a> {
         if more > 0 {
             let _ = write!(text, "; {more} more");
         }
-        text + &main.scope.training
+        text
     }
 
     /// Text of the intervals; empty for a finding without one.
@@ -387,147 +444,13 @@ impl Effect {
                 format!("{value} [{low}, {high}]")
             }
             Self::Share(numbers) => {
-                let [value, low, high] = numbers.map(|number| percent(number / 100.0));
-                format!("{value} % [{low}, {high}]")
+                let [value, low, high] = numbers.map(|number| number / 100.0);
+                let [low, high] = share_ends(low, high);
+                format!("{} % [{low}, {high}]", percent(value))
             }
         }
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::sentences::{Scope, Tone};
-
-    fn sentence(kind: &'static str, tone: Tone, text: &str, scope: Scope) -> Sentence {
-        Sentence {
-            kind,
-            tone,
-            text: format!("{text}."),
-            detail: String::new(),
-            values: [("difference", -20.0), ("low", -40.0), ("high", -5.0)]
-                .map(|(name, value)| (name.to_owned(), value))
-                .into(),
-            scope,
-        }
-    }
-
-    fn scope_of_subject(subject: &str) -> Scope {
-        Scope {
-            subject: Some(subject.to_owned()),
-            ..Scope::default()
-        }
-    }
-
-    fn scope_of_light(light: &str, level: &str) -> Scope {
-        Scope {
-            light: Some(light.to_owned()),
-            at: Some(level.to_owned()),
-            ..Scope::default()
-        }
-    }
-
-    #[test]
-    fn a_detected_finding_is_the_main_finding() {
-        let sentences = [
-            sentence(
-                "enhancer",
-                Tone::NotShown,
-                "a does nothing",
-                scope_of_subject("a"),
-            ),
-            sentence("enhancer", Tone::Worse, "b harms", scope_of_subject("b")),
-            sentence("fidelity", Tone::Better, "psnr", Scope::default()),
-            sentence("darkness", Tone::NotShown, "no loss", Scope::default()),
-            sentence("best", Tone::Better, "m sees best", Scope::default()),
-        ];
-        let groups = FindingGroups::new(&sentences);
-        let first: Vec<(&str, String)> = groups
-            .main_findings()
-            .into_iter()
-            .map(|(title, finding)| (title, finding.text()))
-            .collect();
-        let expected = [("Darkness", "no loss"), ("Enhancers", "b harms")];
-        assert_eq!(
-            first,
-            expected.map(|(title, text)| (title, text.to_owned()))
-        );
-        assert_eq!(groups.summary(), "no loss; b harms.");
-        assert_eq!(groups.count(), 5);
-    }
-
-    #[test]
-    fn all_effects_of_an_enhancer_are_one_finding() {
-        let sentences = [
-            sentence(
-                "enhancer",
-                Tone::Worse,
-                "a harms at L1",
-                scope_of_subject("a"),
-            ),
-            sentence(
-                "enhancer",
-                Tone::Better,
-                "a helps at L4",
-                scope_of_subject("a"),
-            ),
-            sentence("enhancer", Tone::NotShown, "a at L2", scope_of_subject("a")),
-        ];
-        let groups = FindingGroups::new(&sentences);
-        assert_eq!(groups.count(), 1);
-        assert_eq!(
-            groups.main_findings()[0].1.text(),
-            "a harms at L1; a helps at L4"
-        );
-    }
-
-    #[test]
-    fn noise_profiles_are_compared_in_one_finding() {
-        let sentences = [
-            sentence(
-                "darkness",
-                Tone::NotShown,
-                "paper: no loss",
-                scope_of_light("paper", "L3"),
-            ),
-            sentence(
-                "darkness",
-                Tone::Worse,
-                "eld: costs",
-                scope_of_light("eld", "L5"),
-            ),
-        ];
-        let groups = FindingGroups::new(&sentences);
-        let first = groups.main_findings();
-        assert_eq!(first[0].1.text(), "eld: costs");
-        let intervals = first[0].1.intervals();
-        let texts: Vec<String> = intervals.iter().map(ToString::to_string).collect();
-        assert_eq!(
-            texts,
-            [
-                "−20.0 [−40.0, −5.0] at L5",
-                "paper: −20.0 [−40.0, −5.0] at L3"
-            ]
-        );
-    }
-
-    #[test]
-    fn a_summary_without_darkness_is_the_first_finding() {
-        let sentences = [sentence(
-            "noise",
-            Tone::Worse,
-            "noise costs",
-            Scope::default(),
-        )];
-        assert_eq!(FindingGroups::new(&sentences).summary(), "noise costs.");
-        assert_eq!(FindingGroups::new(&[]).summary(), "");
-    }
-
-    #[test]
-    fn a_sentence_of_an_unknown_kind_is_in_the_last_group() {
-        let sentences = [sentence("novel", Tone::Note, "new", Scope::default())];
-        let groups = FindingGroups::new(&sentences);
-        assert_eq!((groups.all()[0].title, groups.count()), ("Sample", 1));
-        assert!(groups.main_findings().is_empty());
-    }
-}
+mod tests;

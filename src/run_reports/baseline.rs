@@ -223,7 +223,7 @@ impl Baseline {
     /// True if any model is significantly worse in any condition. `random`, the observer and its controls do not count as models.
     ///
     /// # Errors
-    /// If a condition of the old run is not compared, no model can be compared, or no test can reach significance.
+    /// If a condition of the old run is not compared or has no verdict, or if no model can be compared.
     pub(super) fn is_worse(&self, unit: ClusterUnit) -> Result<bool> {
         let models: Vec<&BaselineRow> = self
             .rows
@@ -246,10 +246,16 @@ impl Baseline {
                  observer do not count)"
             ));
         }
-        if !models.iter().any(|row| row.significance.is_possible()) {
+        let undecided: Vec<&BaselineRow> = models
+            .into_iter()
+            .filter(|row| !row.significance.is_decided())
+            .collect();
+        if !undecided.is_empty() {
+            let conditions: Vec<String> = undecided.iter().map(|row| name(&row.subject)).collect();
             return refuse(&format!(
-                "no verdict against {old} is possible: {}",
-                no_verdict(&models, unit)
+                "no verdict against {old} is possible on {}: {}",
+                first_names(&conditions, MAX_NAMED),
+                no_verdict(&undecided, unit)
             ));
         }
         Ok(false)

@@ -132,7 +132,8 @@ pub(super) fn command_path(folder: &Path) -> String {
     shell_word(&shown.display().to_string()).into_owned()
 }
 
-/// The scenes and further images that questions state for their frames.
+/// The scenes, further images and digests that questions state for their frames. If runs have other files under the same name, the first
+/// counts.
 pub(super) fn frame_ties<'a>(questions: impl IntoIterator<Item = &'a RunQuestion>) -> FrameTies {
     let mut ties = FrameTies::default();
     for question in questions {
@@ -142,6 +143,9 @@ pub(super) fn frame_ties<'a>(questions: impl IntoIterator<Item = &'a RunQuestion
         }
         if !question.images.is_empty() {
             ties.images.insert(frame.clone(), question.images.clone());
+        }
+        if let Some(digest) = question.image {
+            ties.digests.entry(frame.clone()).or_insert(digest);
         }
     }
     ties
@@ -243,6 +247,8 @@ pub(super) fn check_comparable(runs: &[StoredRun<ChoiceDetail>]) -> Result<()> {
     let mut questions = BTreeMap::<&QuestionId, (usize, BTreeSet<&String>, Option<&String>)>::new();
     for (index, run) in runs.iter().enumerate() {
         let (mut shared, others) = (false, !questions.is_empty());
+        // The first by name, because the order of the replies varies.
+        let mut differing: Option<(&QuestionId, usize)> = None;
         for item in run.trials.items().into_iter().flatten() {
             let choices: BTreeSet<&String> = item.choices.iter().collect();
             let truth = item.truth.map(|truth| item.choices.get(truth));
@@ -258,14 +264,17 @@ pub(super) fn check_comparable(runs: &[StoredRun<ChoiceDetail>]) -> Result<()> {
                 .entry(&item.question)
                 .or_insert_with(|| (index, choices.clone(), truth));
             shared |= *first != index;
-            if (&*known, *known_truth) != (&choices, truth) {
-                let problem = format!(
-                    "the question {} has other choices or another true choice in {}; report each run alone",
-                    item.question,
-                    runs[*first].folder.display()
-                );
-                return refuse(run, problem);
+            let differs = (&*known, *known_truth) != (&choices, truth);
+            if differs && differing.is_none_or(|(other, _)| *item.question < *other) {
+                differing = Some((&item.question, *first));
             }
+        }
+        if let Some((question, first)) = differing {
+            let problem = format!(
+                "the question {question} has other choices or another true choice in {}; report each run alone",
+                runs[first].folder.display()
+            );
+            return refuse(run, problem);
         }
         if others && !shared {
             let problem = format!(

@@ -4,7 +4,9 @@ use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use super::alerts::{empty_answer_alerts, joining_alerts, open_early_ends, run_alerts};
+use super::alerts::{
+    empty_answer_alerts, joining_alerts, missing_alerts, open_early_ends, run_alerts,
+};
 use super::combine::command_path;
 use super::enhancers;
 use super::join::join;
@@ -36,7 +38,7 @@ use crate::types::{
 use darkqa_score::choice::llm_match::{Protocol, mark};
 use darkqa_score::model_in_condition::ModelInCondition;
 use darkqa_score::open::{
-    AnswerOutcome, OpenSummary, QuestionGroups, ScoredAnswer, open_summary_listed,
+    AnswerOutcome, Group, OpenSummary, QuestionGroups, ScoredAnswer, open_summary_listed,
 };
 
 /// Scored answers of a run, or of several joined into one.
@@ -48,6 +50,18 @@ pub(crate) struct Scores {
     answers: Vec<ReportedAnswer>,
     alerts: Vec<Alert>,
     enhancers: Vec<EnhancerRow>,
+}
+
+/// Alerts about answers without a score; empty if no answer is scored, because the run has no judge.
+fn unscored_alerts(summary: &OpenSummary) -> Vec<Alert> {
+    let cells = summary.cells.iter().filter(|cell| cell.group == Group::All);
+    if cells.clone().all(|cell| cell.scored() == 0) {
+        return Vec::new();
+    }
+    let counts: Vec<_> = cells
+        .map(|cell| (&cell.subject, [cell.planned - cell.scored(), cell.planned]))
+        .collect();
+    missing_alerts(&counts, "Scores")
 }
 
 impl Scores {
@@ -93,11 +107,15 @@ impl Scores {
             });
         }
         let groups: Vec<QuestionGroups> = run.questions.iter().map(question_groups).collect();
+        let summary = open_summary_listed(&scored, &groups, &listing);
+        let mut alerts = alerts;
+        alerts.extend(unscored_alerts(&summary));
+        alerts.sort_by_key(|alert| alert.kind);
         Ok(Self {
-            summary: open_summary_listed(&scored, &groups, &listing),
             run,
             judge,
             protocol,
+            summary,
             answers,
             alerts,
             enhancers,

@@ -66,6 +66,8 @@ struct SameQuestionAccuracy {
     others: Option<f64>,
     /// Number of the subject's "cannot tell" replies.
     cannot_tell: usize,
+    /// Number of the subject's missing replies, with its accuracy if all of them were wrong, and if all were right; `None` without any.
+    missing: Option<(usize, [f64; 2])>,
 }
 
 impl SameQuestionAccuracy {
@@ -102,6 +104,7 @@ impl SameQuestionAccuracy {
             others: (!other_accuracies.is_empty())
                 .then(|| other_accuracies.iter().sum::<f64>() / other_accuracies.len() as f64),
             cannot_tell,
+            missing: cell.bounds().map(|bounds| (cell.failed, bounds)),
         })
     }
 }
@@ -152,7 +155,15 @@ fn sentence(findings: &Findings<'_>, name: &str, variant: &Variant) -> Option<Se
     for accuracy in &accuracies {
         let level = accuracy.level;
         let percent = numbers.percent(&format!("{level}"), accuracy.own.value);
-        own_shares.push(format!("{percent} % at {level}"));
+        let missing = accuracy
+            .missing
+            .map_or_else(String::new, |(count, bounds)| {
+                let low = numbers.percent(&format!("if wrong {level}"), bounds[0]);
+                let high = numbers.percent(&format!("if right {level}"), bounds[1]);
+                let count = numbers.count(&format!("missing {level}"), count);
+                format!(" of its replies ({low} to {high} % with the {count} missing ones)")
+            });
+        own_shares.push(format!("{percent} %{missing} at {level}"));
         if let Some(others) = accuracy.others {
             let percent = numbers.percent(&format!("others {level}"), others);
             other_shares.push(format!("{percent} %"));

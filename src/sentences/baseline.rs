@@ -45,14 +45,28 @@ pub(crate) fn no_verdict(rows: &[&BaselineRow], unit: ClusterUnit) -> String {
     too_few(rows, &mut Numbers::new(unit))
 }
 
-/// The reason why no verdict is possible: too few shared questions in every condition, or too few clusters for a small p-value.
+/// The reason why no verdict is possible: missing replies, too few shared questions, or too few clusters for a small p-value.
 fn too_few(rows: &[&BaselineRow], numbers: &mut Numbers) -> String {
     let shared = rows
         .iter()
         .map(|row| row.paired.difference.n)
         .max()
         .unwrap_or(0);
-    if shared < MIN_PAIRS {
+    let most_missing = rows
+        .iter()
+        .filter(|row| {
+            row.significance == Significance::Missing
+                || row.paired.missing > row.paired.difference.n
+        })
+        .max_by_key(|row| row.paired.missing);
+    if let Some(row) = most_missing {
+        format!(
+            "at {} {} of {} questions lack a reply in one of the runs, and their replies decide",
+            row.subject.condition(),
+            numbers.count("missing", row.paired.missing),
+            numbers.count("asked", row.paired.missing + row.paired.difference.n)
+        )
+    } else if shared < MIN_PAIRS {
         format!(
             "no condition shares more than {}, and {} are needed",
             numbers.count("n", shared)
@@ -104,7 +118,7 @@ fn no_difference(rows: &[&BaselineRow], old: &str, unit: ClusterUnit) -> Sentenc
     let possible: Vec<&BaselineRow> = rows
         .iter()
         .copied()
-        .filter(|row| row.significance.is_possible())
+        .filter(|row| row.significance.is_decided())
         .collect();
     let Some(largest) = largest(&possible, |row| row.paired.difference) else {
         let text = format!("No verdict against {old} is possible.");

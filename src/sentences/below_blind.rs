@@ -8,7 +8,7 @@ use super::sentence::{Numbers, Sentence, Tone, capitalised, level_runs};
 use crate::text::words::family as family_name;
 use crate::types::{Axis, AxisLevel, Variant};
 use darkqa_score::cluster::ClusterUnit;
-use darkqa_score::comparisons::{Claim, Comparison, ComparisonKind, PooledFinding, PooledKind};
+use darkqa_score::comparisons::{Claim, Comparison, PooledFinding, PooledKind};
 use darkqa_score::findings::Findings;
 use darkqa_score::significance::Significance;
 
@@ -91,7 +91,7 @@ pub(super) fn untouched(findings: &Findings<'_>) -> Option<Sentence> {
             against(finding)
         ),
         // One sentence for all topics reports that no verdict is possible.
-        Claim::Impossible => return None,
+        Claim::Impossible | Claim::Missing => return None,
         _ => {
             if let Some(unconfirmed) = unconfirmed(finding.claim(), finding.strict.difference) {
                 let difference = finding.strict.difference.value;
@@ -112,19 +112,14 @@ pub(super) fn untouched(findings: &Findings<'_>) -> Option<Sentence> {
     Some(numbers.sentence("images", Tone::from(finding.claim()), text, detail))
 }
 
-/// Comparisons by family between raw images of a variant and no images, for the models whose findings are pooled.
+/// Comparisons between raw images of a variant and no images, for each model whose findings are pooled: by family, and over all families
+/// if there are several models.
 pub(super) fn by_family<'f>(findings: &'f Findings<'_>, variant: &Variant) -> Vec<&'f Comparison> {
-    let models = findings.models_of(variant);
     findings
         .comparisons
         .iter()
         .filter(|comparison| {
-            let first = &comparison.first;
-            comparison.kind == ComparisonKind::Blind
-                && comparison.family.is_some()
-                && first.variant == *variant
-                && first.enhancer.is_none()
-                && models.contains(&&*first.model)
+            comparison.first.variant == *variant && findings.is_tested_against_blind(comparison)
         })
         .collect()
 }

@@ -4,7 +4,7 @@ use super::sentence::{Numbers, Sentence, Tone};
 use crate::types::{AxisLevel, Variant};
 use darkqa_score::calibration::Calibration;
 use darkqa_score::calibration::MIN_CONFIDENT_REPLIES;
-use darkqa_score::cluster::{ClusterUnit, MIN_SCENES};
+use darkqa_score::cluster::{ClusterUnit, MIN_CLUSTERS};
 use darkqa_score::findings::Findings;
 use darkqa_score::model_in_condition::ModelInCondition;
 
@@ -21,7 +21,7 @@ impl<'f> Confidence<'f> {
     /// The calibrations with raw images at the darkest level of a variant, for the models of the pooled findings. Models with few replies
     /// are left out, and all models if there are few clusters, because their intervals are too wide.
     pub(super) fn all(findings: &'f Findings<'_>, variant: &Variant) -> Vec<Self> {
-        if findings.grid.clusters < MIN_SCENES {
+        if findings.grid.clusters < MIN_CLUSTERS {
             return Vec::new();
         }
         let models = findings.models_of(variant);

@@ -3,13 +3,14 @@
 use super::format::format_alone;
 use super::lights::{Topic, findings_of_kind, mean_findings};
 use super::pooled::{
-    detail, lower_or_higher, mean_levels, reservation, runs, unconfirmed, with_verdict,
+    curve, detail, lower_or_higher, mean_levels, reservation, runs, unconfirmed, with_verdict,
 };
 use super::sample::WIDE;
 use super::sentence::{Numbers, Sentence, Tone, capitalised};
+use super::undecided::{Undecided, silent_levels};
 use crate::text::words::light;
 use crate::types::degradations::{Axis, Kind};
-use crate::types::{RunGroup, Variant};
+use crate::types::{AxisLevel, RunGroup, Variant};
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::{Claim, PooledFinding, PooledKind};
 use darkqa_score::findings::Findings;
@@ -38,7 +39,7 @@ fn topic_sentences(findings: &Findings<'_>, topic: &Topic<'_>) -> Vec<Sentence> 
             .filter_map(|other| CostOfDarkness::new(findings, other).verdict())
             .any(|other| Some(other) != verdict);
         let name = (differs && lights.len() == 1).then(|| name(variant));
-        let sentence = with_variant(&cost.levels, cost.mean, name.as_deref(), unit);
+        let sentence = cost.sentence(name.as_deref(), unit);
         sentences.extend(sentence.map(|sentence| topic.add_light(variant, sentence)));
     }
     for other in others {
@@ -50,7 +51,7 @@ fn topic_sentences(findings: &Findings<'_>, topic: &Topic<'_>) -> Vec<Sentence> 
             .any(|variant| CostOfDarkness::new(findings, variant).verdict() == verdict);
         if !is_reported && verdict.is_some_and(Significance::is_shown) {
             let name = name(other);
-            sentences.extend(with_variant(&cost.levels, cost.mean, Some(&name), unit));
+            sentences.extend(cost.sentence(Some(&name), unit));
         }
     }
     sentences
@@ -61,6 +62,8 @@ struct CostOfDarkness<'f> {
     levels: Vec<&'f PooledFinding>,
     /// The mean over the darker levels.
     mean: Option<&'f PooledFinding>,
+    /// Levels that were asked, and at which no question has all replies.
+    silent: Vec<AxisLevel>,
 }
 
 impl<'f> CostOfDarkness<'f> {
@@ -70,7 +73,13 @@ impl<'f> CostOfDarkness<'f> {
             mean: mean_findings(findings, PooledKind::Darkness, variant)
                 .into_iter()
                 .next(),
+            silent: silent_levels(findings, variant),
         }
+    }
+
+    /// The sentence of [`with_variant`].
+    fn sentence(&self, name: Option<&str>, unit: ClusterUnit) -> Option<Sentence> {
+        with_variant(&self.levels, self.mean, &self.silent, name, unit)
     }
 
     /// The verdict of the levels; if none is detected, the verdict of their mean.
@@ -117,25 +126,39 @@ fn name(variant: &Variant) -> String {
 }
 
 /// The cost of darkness with one variant: at the darkest level where it is detected, otherwise as the mean over the darker levels if that
-/// is detected, otherwise that nothing was detected. The sentence begins with `name`.
+/// is detected, otherwise that missing replies allow no verdict, otherwise that nothing was detected. `silent` are the levels at which no
+/// question has all replies. The sentence begins with `name`.
 pub(super) fn with_variant(
     levels: &[&PooledFinding],
     mean: Option<&PooledFinding>,
+    silent: &[AxisLevel],
     name: Option<&str>,
     unit: ClusterUnit,
 ) -> Option<Sentence> {
     let mut numbers = Numbers::new(unit);
-    let verdict = verdict(levels)?;
+    let undecided = Undecided::new(levels, silent);
+    let verdict = verdict(levels);
+    let is_shown = verdict.is_some_and(Significance::is_shown);
     if let Some(mean) = mean
         && let Some(mean_verdict) = mean_verdict(mean)
-        && !verdict.is_shown()
+        && !is_shown
     {
         return Some(over_levels(mean, levels, mean_verdict, name, numbers));
     }
+    let cause = levels.first()?.level.axis().unwrap_or(Axis::LIGHT).cause;
+    if !is_shown
+        && let Some(mut sentence) = undecided.sentence("darkness", &cause.to_lowercase(), unit)
+    {
+        sentence.text = match name {
+            None => sentence.text,
+            Some(name) => format!("{name}: {}", sentence.text),
+        };
+        return Some(sentence);
+    }
+    let verdict = verdict?;
     let found = with_verdict(levels, verdict);
     let darkest = found.last()?;
     let size = darkest.strict.difference.value;
-    let cause = darkest.level.axis().unwrap_or(Axis::LIGHT).cause;
     let (text, more) = match verdict {
         Significance::Worse => (
             format!(
@@ -144,7 +167,11 @@ pub(super) fn with_variant(
                 darkest.level,
                 numbers.percent("L0", darkest.strict.second)
             ),
-            format!("; a loss is shown at {}", runs(&found, levels)),
+            format!(
+                "; a loss is shown at {}{}",
+                runs(&found, levels),
+                curve(levels, &mut numbers)
+            ),
         ),
         Significance::Better => (
             format!(
@@ -152,7 +179,7 @@ pub(super) fn with_variant(
                 darkest.level,
                 numbers.size("gain", size)
             ),
-            format!("; at {}", darkest.level),
+            format!("; at {}{}", darkest.level, curve(levels, &mut numbers)),
         ),
         _ => {
             if let Some(format) = format_alone(levels, unit) {
@@ -178,7 +205,12 @@ pub(super) fn with_variant(
         }
     };
     let text = begin_with(name, &text);
-    let detail = detail(darkest, &mut numbers, &more);
+    let without = if undecided.is_empty() {
+        String::new()
+    } else {
+        format!("; missing replies allow no verdict at {}", undecided.at())
+    };
+    let detail = detail(darkest, &mut numbers, &(more + &without));
     Some(numbers.sentence("darkness", Tone::from(verdict), text, detail))
 }
 
@@ -213,7 +245,10 @@ fn over_levels(
             numbers.size("gain", size)
         )
     };
-    let more = format!("; mean of {at}, no level alone is shown");
+    let more = format!(
+        "; mean of {at}, no level alone is shown{}",
+        curve(levels, &mut numbers)
+    );
     let detail = detail(mean, &mut numbers, &more);
     numbers.sentence("darkness", verdict.into(), begin_with(name, &text), detail)
 }

@@ -145,12 +145,8 @@ pub(super) fn collapse(answers: &[TopAnswer<'_>], unit: ClusterUnit) -> Option<S
 fn collapse_detail(answer: &TopAnswer<'_>, numbers: &mut Numbers) -> String {
     let share = answer.collapse.share;
     numbers.at(&answer.level);
-    let ends = [
-        ("share", share.value),
-        ("low", share.low),
-        ("high", share.high),
-    ];
-    let [value, low, high] = ends.map(|(name, share)| numbers.percent(name, share));
+    let value = numbers.percent("share", share.value);
+    let ends = numbers.share_ends("", share);
     let clean = answer.collapse.clean.as_ref().map(|clean| {
         let share = numbers.percent("L0", clean.strict.second);
         let difference = numbers.difference("_from_L0", clean.strict.difference);
@@ -161,7 +157,7 @@ fn collapse_detail(answer: &TopAnswer<'_>, numbers: &mut Numbers) -> String {
     let n = numbers.count("n", share.n);
     let clusters = numbers.clusters(answer.collapse.clusters);
     format!(
-        "{}: {value} % [{low}, {high}]{}; limit: {limit} points above the true share; n = {n} in {clusters}",
+        "{}: {value} % [{ends}]{}; limit: {limit} points above the true share; n = {n} in {clusters}",
         answer.model,
         clean.unwrap_or_default()
     )

@@ -25,6 +25,7 @@ mod real;
 mod sample;
 mod self_agreement;
 mod sentence;
+mod undecided;
 
 pub(crate) use baseline::{against_baseline, no_verdict};
 pub(crate) use models::dark_levels;

@@ -1,19 +1,19 @@
-//! Sentences about single models and families: the best model in the dark, and the family with the largest loss.
-
-use std::cmp::Ordering;
+//! Sentences about single models and families: the best model in the dark, and a family that loses more than another.
 
 use super::lights::Topic;
 use super::sample::listed;
 use super::sentence::{Numbers, Sentence, Tone, capitalised, level_runs};
 use crate::text::words::family;
-use crate::types::Variant;
 use crate::types::degradations::{Axis, Kind};
-use darkqa_score::comparisons::{BestInTheDark, Claim, Crossing, PooledFinding, PooledKind};
+use crate::types::{AxisLevel, Family, Variant};
+use darkqa_score::comparisons::{BestInTheDark, Claim, Crossing, LevelLead, PooledKind};
+use darkqa_score::estimate::largest;
 use darkqa_score::findings::Findings;
 use darkqa_score::significance::Significance;
 
 /// The model with the highest mean accuracy in the dark, and the models that it was not detected to be better than; or all models that
-/// share that accuracy. If the order of the two leading models changes with the level, the sentence reports that change instead.
+/// share that accuracy. If another model is detected to be better at some level and the leader at another, the sentence reports these
+/// levels instead. The leader “sees” only if it is detected to be above its own replies without images, or above chance.
 pub(super) fn best(findings: &Findings<'_>) -> Option<Sentence> {
     let best = findings.best.as_ref().filter(|best| best.is_possible())?;
     let lenient = findings.lenient_best.as_ref()?;
@@ -23,14 +23,24 @@ pub(super) fn best(findings: &Findings<'_>) -> Option<Sentence> {
     let axis = best.variant.kind.map_or(Axis::LIGHT, Kind::axis);
     let place = axis.place;
     let leaders = leaders(best);
-    let is_same = lenient.is_detected() && lenient.leader().model == leader.model;
-    let (tone, text) = if let Some(crossing) = crossing(best, lenient) {
-        let ((before, last), (after, first)) = (&crossing.before, &crossing.after);
-        let text = format!("{before} is better to {last}, {after} from {first}.");
-        (Tone::Note, text)
-    } else if best.is_detected() && is_same {
+    let crossing = DetectedCrossing::new(best, lenient);
+    let is_best = findings.detected_best().is_some();
+    let blind = if best.gain.is_against_blind {
+        "its own replies without images"
+    } else {
+        "chance"
+    };
+    let (tone, text) = if let Some(crossing) = &crossing {
+        (Tone::Note, crossing.text())
+    } else if is_best && best.gain.is_detected() && lenient.gain.is_detected() {
         let text = format!("{} sees best {place} ({over}).", leader.model);
         (Tone::Better, text)
+    } else if is_best {
+        let text = format!(
+            "{} has the highest mean accuracy {place} ({over}), but was not detected to be above {blind}.",
+            leader.model
+        );
+        (Tone::Note, text)
     } else if leaders.len() > 1 {
         let models = listed(&leaders);
         let text = format!("{models} share the highest mean accuracy {place} ({over}).");
@@ -47,20 +57,13 @@ pub(super) fn best(findings: &Findings<'_>) -> Option<Sentence> {
         (Tone::NotShown, text)
     };
     let value = numbers.percent("mean", leader.mean.value);
-    let low = numbers.percent("mean_low", leader.mean.low);
-    let high = numbers.percent("mean_high", leader.mean.high);
+    let ends = numbers.share_ends("mean_", leader.mean);
     let loss = leader.loss.map_or_else(String::new, |loss| {
         let loss = numbers.difference("_from_L0", loss);
         format!(", {loss} points from L0")
     });
-    let test = if let Some(crossing) = crossing(best, lenient) {
-        let lead = numbers.difference("_before", crossing.lead);
-        let lag = numbers.difference("_after", crossing.lag);
-        let p = numbers.p("p", crossing.p_report.unwrap_or(crossing.p));
-        format!(
-            "{} less {}: {lead} to {}, {lag} from {}, {p}",
-            crossing.before.0, crossing.after.0, crossing.before.1, crossing.after.1
-        )
+    let test = if let Some(crossing) = &crossing {
+        crossing.detail(&mut numbers)
     } else {
         let pair = best
             .pairs
@@ -68,12 +71,19 @@ pub(super) fn best(findings: &Findings<'_>) -> Option<Sentence> {
             .find(|pair| pair.first == leader.model && pair.second == second.model)?;
         let difference = numbers.difference("", pair.difference);
         let p = numbers.p("p", best.p_report.unwrap_or(pair.holm));
-        let parsing = if best.is_detected() && !is_same {
+        let parsing = if best.is_detected() && !is_best {
             ", detected in the strict parsing alone"
         } else {
             ""
         };
-        format!("{difference} against {}, {p}{parsing}", second.model)
+        let gain = if is_best {
+            let gain = numbers.difference("_gain", best.gain.difference);
+            let p = numbers.p("p_gain", best.gain.p_report.unwrap_or(best.gain.p));
+            format!("; {gain} against {blind}, {p}")
+        } else {
+            String::new()
+        };
+        format!("{difference} against {}, {p}{parsing}{gain}", second.model)
     };
     let items = numbers.count("n", best.items);
     let clusters = numbers.clusters(best.clusters);
@@ -82,7 +92,7 @@ pub(super) fn best(findings: &Findings<'_>) -> Option<Sentence> {
         models => format!("; without {}, which answered less", models.join(", ")),
     };
     let detail = format!(
-        "{} over {over}: {value} % [{low}, {high}]{loss}; {test}; n = {items} in {clusters}{without}",
+        "{} over {over}: {value} % [{ends}]{loss}; {test}; n = {items} in {clusters}{without}",
         leader.model
     );
     let sentence = numbers.sentence("best", tone, text, detail);
@@ -106,15 +116,79 @@ fn leaders(best: &BestInTheDark) -> Vec<String> {
 /// Maximum rounding error of equal means (chosen).
 const ROUNDING: f64 = 1e-9;
 
-/// The change of order of two models, if it is detected in both parsings.
-fn crossing<'b>(best: &'b BestInTheDark, lenient: &BestInTheDark) -> Option<&'b Crossing> {
-    let strict = best.crossing.as_ref().filter(|found| found.is_detected())?;
-    let lenient = lenient
-        .crossing
-        .as_ref()
-        .filter(|found| found.is_detected())?;
-    let is_same = strict.before.0 == lenient.before.0 && strict.after.0 == lenient.after.0;
-    is_same.then_some(strict)
+/// Two models of which one is detected to be better at some levels, and the other one at others.
+struct DetectedCrossing<'b> {
+    crossing: &'b Crossing,
+    /// Levels at which the leader in the light is better.
+    light: Vec<&'b LevelLead>,
+    /// Levels at which the leader in the dark is better.
+    dark: Vec<&'b LevelLead>,
+}
+
+impl<'b> DetectedCrossing<'b> {
+    /// The levels that are detected in both parsings with the same direction; `None` unless both models are better at some level.
+    fn new(strict: &'b BestInTheDark, lenient: &BestInTheDark) -> Option<Self> {
+        let (crossing, other) = (strict.crossing.as_ref()?, lenient.crossing.as_ref()?);
+        if (&crossing.light, &crossing.dark) != (&other.light, &other.dark) {
+            return None;
+        }
+        let detected = crossing
+            .levels
+            .iter()
+            .zip(&other.levels)
+            .filter(|(one, other)| {
+                let is_same_direction = one.lead.value * other.lead.value > 0.0;
+                one.is_detected() && other.is_detected() && is_same_direction
+            })
+            .map(|(level, _)| level);
+        let (light, dark): (Vec<_>, Vec<_>) = detected.partition(|level| level.lead.value > 0.0);
+        (!light.is_empty() && !dark.is_empty()).then_some(Self {
+            crossing,
+            light,
+            dark,
+        })
+    }
+
+    fn text(&self) -> String {
+        let all: Vec<AxisLevel> = self.crossing.levels.iter().map(|one| one.level).collect();
+        let [light, dark] = [&self.light, &self.dark]
+            .map(|levels| levels.iter().map(|one| one.level).collect::<Vec<_>>());
+        let rest: Vec<AxisLevel> = all
+            .iter()
+            .copied()
+            .filter(|level| !light.contains(level) && !dark.contains(level))
+            .collect();
+        let [light, dark, rest] = [light, dark, rest].map(|levels| level_runs(&levels, &all));
+        let not_told_apart = if rest.is_empty() {
+            String::new()
+        } else {
+            format!("; not told apart at {rest}")
+        };
+        let (first, second) = (&self.crossing.light, &self.crossing.dark);
+        format!("{first} is better at {light}, {second} at {dark}{not_told_apart}.")
+    }
+
+    /// The largest difference in each direction, and the larger p-value of the two.
+    fn detail(&self, numbers: &mut Numbers) -> String {
+        let ends = [(&self.light, "_before"), (&self.dark, "_after")];
+        let mut p = 0.0_f64;
+        let differences: Vec<String> = ends
+            .into_iter()
+            .filter_map(|(levels, name)| {
+                let largest = largest(levels, |one| one.lead)?;
+                p = p.max(largest.p_report.unwrap_or(largest.p));
+                let lead = numbers.difference(name, largest.lead);
+                Some(format!("{lead} at {}", largest.level))
+            })
+            .collect();
+        format!(
+            "{} less {}: {}, {}",
+            self.crossing.light,
+            self.crossing.dark,
+            differences.join(", "),
+            numbers.p("p", p)
+        )
+    }
 }
 
 /// The dark levels over which models are compared, as `L3–L5`.
@@ -122,55 +196,55 @@ pub(crate) fn dark_levels(best: &BestInTheDark) -> String {
     level_runs(&best.levels, &best.asked)
 }
 
-/// The families with the largest and the smallest loss at the darkest level, if a loss over all families is detected there and the two
-/// intervals do not overlap. This is a description without a test, because the data chose the two families.
+/// Two families of which one is detected to lose more than the other at the darkest level, if a loss over all families is detected there.
 pub(super) fn families(findings: &Findings<'_>, variant: &Variant) -> Option<Sentence> {
-    let of_families = findings.pooled.iter().filter(|finding| {
-        finding.kind == PooledKind::Darkness
-            && finding.family.is_some()
-            && finding.variant == *variant
-    });
-    let darkest = of_families.clone().map(|finding| finding.level).max()?;
-    let of_families: Vec<&PooledFinding> = of_families
-        .filter(|finding| finding.level == darkest)
-        .collect();
-    let most = of_families.iter().min_by(|a, b| compare_values(a, b))?;
-    let least = of_families.iter().max_by(|a, b| compare_values(a, b))?;
-    let has_loss = findings.pooled.iter().any(|finding| {
-        finding.kind == PooledKind::Darkness
-            && finding.family.is_none()
-            && finding.variant == *variant
-            && finding.level == darkest
-            && finding.claim() == Claim::Detected(Significance::Worse)
-    });
+    let contrast = findings
+        .contrasts
+        .iter()
+        .find(|found| found.variant == *variant && found.is_detected())?;
+    let at_darkest = |family: Option<&Family>| {
+        findings.pooled.iter().find(|finding| {
+            finding.kind == PooledKind::Darkness
+                && finding.family.as_ref() == family
+                && finding.variant == *variant
+                && finding.level == contrast.level
+        })
+    };
+    let whole = at_darkest(None)?;
+    let (most, least) = (
+        at_darkest(Some(&contrast.most))?,
+        at_darkest(Some(&contrast.least))?,
+    );
     let (of_most, of_least) = (most.strict.difference, least.strict.difference);
-    if !has_loss || most.strict.verdict != Significance::Worse || of_most.high >= of_least.low {
+    if whole.claim() != Claim::Detected(Significance::Worse) || of_most.value >= 0.0 {
         return None;
     }
     let mut numbers = Numbers::new(findings.unit);
     let text = format!(
-        "{} costs more in {} ({} points at {darkest}) than in {} ({}).",
-        capitalised(darkest.axis().unwrap_or(Axis::LIGHT).cause),
-        family(most.family.as_ref()),
+        "{} costs more in {} ({} points at {}) than in {} ({}).",
+        capitalised(contrast.level.axis().unwrap_or(Axis::LIGHT).cause),
+        family(Some(&contrast.most)),
         numbers.points("effect_most", of_most.value),
-        family(least.family.as_ref()),
+        contrast.level,
+        family(Some(&contrast.least)),
         numbers.points("effect_least", of_least.value)
     );
+    let test = contrast.strict;
+    let difference = numbers.difference("", test.difference);
+    let p = numbers.p("p", test.p_report.unwrap_or(test.p));
+    let pairs = numbers.count("pairs", contrast.pairs);
     let [of_most, of_least] = [("_most", of_most), ("_least", of_least)]
         .map(|(at, difference)| numbers.difference(at, difference));
     let sample = [("n_most", most), ("n_least", least)]
         .map(|(name, finding)| numbers.count(name, finding.items));
-    let p = numbers.p("p", most.strict.holm);
+    let of_pairs = if contrast.pairs == 1 {
+        "the only pair".to_owned()
+    } else {
+        format!("one of {pairs} pairs")
+    };
     let detail = format!(
-        "{of_most}, n = {}, against {of_least}, n = {}: the two intervals do not meet, which is no test; {p} is that of the loss in {}",
-        sample[0],
-        sample[1],
-        family(most.family.as_ref())
+        "{of_most}, n = {}, against {of_least}, n = {}: difference {difference}, {p}; {of_pairs} of families",
+        sample[0], sample[1]
     );
     Some(numbers.sentence("families", Tone::Note, text, detail))
-}
-
-fn compare_values(a: &PooledFinding, b: &PooledFinding) -> Ordering {
-    let [a, b] = [a, b].map(|finding| finding.strict.difference.value);
-    a.total_cmp(&b)
 }

@@ -2,6 +2,7 @@
 
 use super::format::format_alone;
 use super::sentence::{Numbers, Sentence, Tone, level_runs, models};
+use super::undecided::Undecided;
 use crate::types::AxisLevel;
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::{Claim, PooledFinding};
@@ -131,10 +132,16 @@ pub(super) fn noise(
             };
             let text =
                 format!("With noise, accuracy is {size} than by the exposure drop alone ({at}).");
+            let more = more + &curve(levels, &mut numbers);
             let detail = detail(effect.largest, &mut numbers, &more);
             sentences.push(numbers.sentence("noise", verdict.into(), text, detail));
         }
     }
+    sentences.extend(Undecided::new(levels, &[]).sentence(
+        "noise",
+        "the difference between noise and the exposure drop alone",
+        unit,
+    ));
     if !sentences.is_empty() {
         return sentences;
     }
@@ -184,10 +191,19 @@ pub(super) fn enhancers(
             .flat_map(|verdict| {
                 DetectedEffect::all(levels, &own, verdict)
                     .into_iter()
-                    .filter_map(move |effect| enhancer(&effect, verdict, unit))
+                    .filter_map(move |effect| enhancer(&effect, levels, verdict, unit))
             });
+        let undecided = levels[0]
+            .enhancer
+            .as_ref()
+            .and_then(|name| Undecided::new(levels, &[]).sentence("enhancer", name.as_str(), unit));
         let no_effect = no_effect(&undetected(levels, &own), levels, unit);
-        sentences.extend(detected.chain(no_effect).take(MAX_PER_ENHANCER));
+        sentences.extend(
+            detected
+                .chain(undecided)
+                .chain(no_effect)
+                .take(MAX_PER_ENHANCER),
+        );
     }
     sentences
 }
@@ -195,6 +211,7 @@ pub(super) fn enhancers(
 /// The detected effect of an enhancer.
 fn enhancer(
     effect: &DetectedEffect<'_>,
+    levels: &[&PooledFinding],
     verdict: Significance,
     unit: ClusterUnit,
 ) -> Option<Sentence> {
@@ -214,7 +231,7 @@ fn enhancer(
         let verb = if is_better { "helps" } else { "harms" };
         (format!("{name} {verb} at {at}, by {size}."), "")
     };
-    let more = effect.place() + note;
+    let more = effect.place() + note + &curve(levels, &mut numbers);
     let detail = detail(effect.largest, &mut numbers, &more);
     Some(numbers.sentence("enhancer", verdict.into(), text, detail))
 }
@@ -280,7 +297,7 @@ pub(super) fn reservation(finding: &PooledFinding, numbers: &mut Numbers) -> Str
     let strict = &finding.strict;
     let difference = strict.difference;
     match finding.claim() {
-        Claim::Detected(_) | Claim::Impossible => String::new(),
+        Claim::Detected(_) | Claim::Impossible | Claim::Missing => String::new(),
         Claim::StrictOnly(_) => ", detected in the strict parsing alone".to_owned(),
         Claim::InOwnSet => format!(
             ", detected only if no other finding is counted ({})",
@@ -295,7 +312,7 @@ pub(super) fn reservation(finding: &PooledFinding, numbers: &mut Numbers) -> Str
 }
 
 /// The findings with a verdict in both parsings and after the correction over all sentences. A finding that could have a verdict but has
-/// none counts as [`Significance::NotShown`].
+/// none counts as [`Significance::NotShown`], unless the missing replies decide it.
 pub(super) fn with_verdict<'f>(
     levels: &[&'f PooledFinding],
     verdict: Significance,
@@ -305,7 +322,7 @@ pub(super) fn with_verdict<'f>(
         .copied()
         .filter(|finding| match finding.claim() {
             Claim::Detected(found) => found == verdict,
-            Claim::Impossible => false,
+            Claim::Impossible | Claim::Missing => false,
             _ => verdict == Significance::NotShown,
         })
         .collect()
@@ -320,6 +337,27 @@ pub(super) fn runs(some: &[&PooledFinding], all: &[&PooledFinding]) -> String {
             .collect::<Vec<AxisLevel>>()
     });
     level_runs(&some, &all)
+}
+
+/// The differences at all levels, beside one that is quoted because its test detected it: chosen so, it is on average larger than the true
+/// one. Empty for a single level.
+pub(super) fn curve(levels: &[&PooledFinding], numbers: &mut Numbers) -> String {
+    if levels.len() < 2 {
+        return String::new();
+    }
+    let all: Vec<AxisLevel> = levels.iter().map(|finding| finding.level).collect();
+    let differences: Vec<String> = levels
+        .iter()
+        .map(|finding| {
+            let name = format!("difference_{}", finding.level);
+            numbers.points(&name, finding.strict.difference.value)
+        })
+        .collect();
+    format!(
+        "; at {}: {}",
+        level_runs(&all, &all),
+        differences.join(", ")
+    )
 }
 
 /// Effect, interval, p and n of a finding, with `more` before n.

@@ -6,6 +6,7 @@ use crate::types::{EnhancerName, Variant};
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::{ModelsLeftOut, PooledFinding, PooledKind};
 use darkqa_score::findings::Findings;
+use darkqa_score::significance::Significance;
 
 /// Half-width of an interval above which the sample is called small, as a share (0.05 is 5 points); chosen.
 pub(super) const WIDE: f64 = 0.05;
@@ -51,7 +52,7 @@ pub(super) fn impossible(findings: &Findings<'_>) -> Option<Sentence> {
     let whole: Vec<&PooledFinding> = findings
         .pooled
         .iter()
-        .filter(|finding| finding.family.is_none())
+        .filter(|finding| finding.family.is_none() && finding.kind != PooledKind::EnhancerPair)
         .collect();
     let (without, with): (Vec<_>, Vec<_>) = whole
         .chunk_by(|a, b| (a.kind, &a.variant, &a.enhancer) == (b.kind, &b.variant, &b.enhancer))
@@ -97,7 +98,12 @@ pub(super) fn impossible(findings: &Findings<'_>) -> Option<Sentence> {
 /// The half-widths of the narrowest and the widest interval, if the widest exceeds [`WIDE`]. This is not the power of the tests, which
 /// depends on more than the intervals.
 pub(super) fn power(all: &[PooledFinding], unit: ClusterUnit) -> Option<Sentence> {
-    let whole = all.iter().filter(|finding| finding.family.is_none());
+    // Missing replies may widen an interval without end, and have a sentence of their own.
+    let whole = all.iter().filter(|finding| {
+        finding.family.is_none()
+            && finding.kind != PooledKind::EnhancerPair
+            && finding.strict.verdict != Significance::Missing
+    });
     let which = if whole
         .clone()
         .all(|finding| finding.strict.verdict.is_possible())

@@ -100,15 +100,14 @@ fn between(found: &SelfAgreement<'_>) -> Vec<Sentence> {
             "At L0 {} and {} give the same answer to {same} % of the questions that both answer.",
             pair.first, pair.second
         );
-        let [low, high] = [("low", pair.same.low), ("high", pair.same.high)]
-            .map(|(name, value)| numbers.percent(name, value));
+        let ends = numbers.share_ends("", pair.same);
         let kappa = match pair.kappa {
             Some(kappa) => format!("κ {}", numbers.number("kappa", kappa.value, 2)),
             None => "κ not defined".to_owned(),
         };
         let n = numbers.count("n", pair.same.n);
         let detail = format!(
-            "[{low}, {high}] %, {kappa}, n = {n}; each is compared with itself, so that their agreements in the dark can be compared only as far as this"
+            "[{ends}] %, {kappa}, n = {n}; each is compared with itself, so that their agreements in the dark can be compared only as far as this"
         );
         numbers.sentence("models_in_light", Tone::Note, text, detail)
     }).collect()
@@ -176,14 +175,32 @@ fn darkness(found: &SelfAgreement<'_>, model: &str, variant: &Variant) -> Option
         format!("; {}", references.join(", "))
     };
     let text = format!(
-        "At {level} ({}) {model} gives its answer at L0 to {share} % of the questions{references}.",
-        light(variant, None)
+        "At {level} ({}) {model} gives its answer at L0 to {share} % of the questions{references}{}.",
+        light(variant, None),
+        half_lost(found, dark, &mut numbers)
     );
     let test = compared(found, ComparisonKind::Level, model)
         .find(|comparison| comparison.first == dark.subject);
     let detail = darkness_detail(found, dark, level, test, &mut numbers);
     let tone = test.map_or(Tone::Note, |test| test.claim().into());
     Some(numbers.sentence("agreement_in_the_dark", tone, text, detail))
+}
+
+/// The end of the sentence: where half of the evidence is lost; empty if that is unknown or beyond the darkest level.
+fn half_lost(found: &SelfAgreement<'_>, dark: &AgreementCell, numbers: &mut Numbers) -> String {
+    let subject = &dark.subject;
+    let curve = found.curves.iter().find(|curve| {
+        curve.model == subject.model && curve.variant == subject.variant && curve.enhancer.is_none()
+    });
+    match curve.and_then(|curve| curve.threshold.as_ref().ok()) {
+        Some(threshold) if threshold.value.is_finite() => {
+            let axis = subject.level.and_then(AxisLevel::axis);
+            let unit = axis.map_or("EV", |axis| axis.unit);
+            let value = numbers.number("threshold", threshold.value, 1);
+            format!("; half of the evidence is lost at {value} {unit}")
+        }
+        _ => String::new(),
+    }
 }
 
 /// The detail of the sentence about the agreement at the darkest level.
@@ -197,13 +214,9 @@ fn darkness_detail(
     let model = &*dark.subject.model;
     let mut parts = Vec::new();
     if let Some(Ok(kept)) = dark.evidence {
-        let [value, low, high] = [
-            ("evidence", kept.value),
-            ("evidence_low", kept.low),
-            ("evidence_high", kept.high),
-        ]
-        .map(|(name, value)| numbers.percent(name, value));
-        parts.push(format!("evidence kept {value} % [{low}, {high}]"));
+        let value = numbers.percent("evidence", kept.value);
+        let ends = numbers.share_ends("evidence_", kept);
+        parts.push(format!("evidence kept {value} % [{ends}]"));
     }
     parts.push(match dark.kappa {
         Some(kappa) => format!("κ {}", numbers.number("kappa", kappa.value, 2)),
@@ -220,16 +233,6 @@ fn darkness_detail(
         let difference = numbers.difference("", test.strict.paired.difference);
         let p = numbers.p("p", test.strict.p_report.unwrap_or(test.strict.holm));
         parts.push(format!("{difference} points against L0 asked again, {p}"));
-    }
-    let curve = found.curves.iter().find(|curve| {
-        curve.model == model && curve.variant == dark.subject.variant && curve.enhancer.is_none()
-    });
-    if let Some(threshold) = curve.and_then(|curve| curve.threshold.as_ref().ok())
-        && threshold.value.is_finite()
-    {
-        let unit = level.axis().map_or("EV", |axis| axis.unit);
-        let value = numbers.number("threshold", threshold.value, 1);
-        parts.push(format!("half is left at {value} {unit}"));
     }
     if let Some(read) = found.light_of(model).and_then(|light| light.read) {
         let read = numbers.percent("read_in_light", read.value);
@@ -380,10 +383,9 @@ fn cannot_tell_shares(found: &SelfAgreement<'_>, model: &str) -> Option<Sentence
     let text = format!(
         "{model} says “cannot tell” to {in_light} % of the questions at L0, and to {here} % at {level}."
     );
-    let [low, high] = [("low", share.low), ("high", share.high)]
-        .map(|(name, value)| numbers.percent(name, value));
+    let ends = numbers.share_ends("", share);
     let n = numbers.count("n", share.n);
-    let detail = format!("[{low}, {high}] % at {level}, n = {n}");
+    let detail = format!("[{ends}] % at {level}, n = {n}");
     Some(numbers.sentence("cannot_tell", Tone::Note, text, detail))
 }
 

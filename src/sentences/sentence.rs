@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::text::words::points;
+use crate::text::words::{p, points, share_decimals};
 use crate::types::text::counted;
 use crate::types::{EnhancerName, ModelListing};
 use darkqa_score::cluster::ClusterUnit;
@@ -32,19 +32,20 @@ pub(crate) struct Sentence {
 }
 
 impl Sentence {
-    /// Adds the training data of the enhancer to the text, if they are known.
+    /// Adds a second sentence with the training data of the enhancer to the text, if they are known.
     pub(super) fn add_training_data(&mut self, listing: &ModelListing) {
-        let enhancer = self.scope.subject.as_deref();
-        if let Some(training) = enhancer.and_then(|enhancer| listing.training(enhancer)) {
-            self.scope.training = format!(" ({training})");
-            self.text = format!("{}{}.", self.claim(), self.scope.training);
+        if let Some(enhancer) = &self.scope.subject
+            && let Some(training) = listing.training(enhancer)
+        {
+            self.scope.training = format!("{enhancer} was {training}.");
+            self.text = format!("{} {}", self.text, self.scope.training);
         }
     }
 
-    /// The text without training data and full stop.
+    /// The text without the sentence about training data and without full stop.
     pub(crate) fn claim(&self) -> &str {
-        let text = self.text.trim_end_matches('.');
-        text.strip_suffix(&self.scope.training).unwrap_or(text)
+        let text = self.text.strip_suffix(&self.scope.training);
+        text.unwrap_or(&self.text).trim_end_matches(['.', ' '])
     }
 }
 
@@ -57,7 +58,7 @@ pub(crate) struct Scope {
     pub subject: Option<String>,
     /// The level, or the levels, of the difference.
     pub at: Option<String>,
-    /// Training data of the enhancer at the end of the text; empty if unknown.
+    /// The sentence about the training data of the enhancer at the end of the text; empty if they are unknown.
     pub training: String,
 }
 
@@ -189,6 +190,14 @@ impl Numbers {
         self.number(name, 100.0 * share, 1)
     }
 
+    /// The ends of the interval of a share in percent, as `93.0, 98.2`. The names begin with `of`.
+    pub(super) fn share_ends(&mut self, of: &str, share: Estimate) -> String {
+        let decimals = share_decimals(share.low, share.high) as u8;
+        let [low, high] = [("low", share.low), ("high", share.high)]
+            .map(|(name, value)| self.number(&format!("{of}{name}"), 100.0 * value, decimals));
+        format!("{low}, {high}")
+    }
+
     /// The size of a difference in points, without its sign.
     pub(super) fn size(&mut self, name: &str, difference: f64) -> String {
         self.number(name, 100.0 * difference.abs(), 1)
@@ -214,12 +223,14 @@ impl Numbers {
 
     /// A p-value, as `p = 0.036` or `p < 0.001`.
     pub(super) fn p(&mut self, name: &str, value: f64) -> String {
-        if value < 0.001 {
-            self.values.insert(name.to_owned(), 0.001);
-            "p < 0.001".to_owned()
-        } else {
-            format!("p = {}", self.number(name, value, 3))
-        }
+        let text = p(value);
+        let (sign, number) = match text.strip_prefix("< ") {
+            Some(bound) => ("<", bound),
+            None => ("=", &*text),
+        };
+        self.values
+            .insert(name.to_owned(), number.parse().unwrap_or(value));
+        format!("p {sign} {number}")
     }
 
     /// The number of clusters, as `30 scenes`.

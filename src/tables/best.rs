@@ -2,7 +2,7 @@
 
 use crate::sentences::dark_levels;
 use crate::text::table::ColumnKind::{Number, P, Percent, Points, Significance, Text};
-use crate::text::table::{Table, TableBuilder};
+use crate::text::table::{Table, TableBuilder, TableCell};
 use crate::text::words::{light, points};
 use darkqa_score::comparisons::{BestInTheDark, DarkAccuracy, DarkPair};
 use darkqa_score::findings::Findings;
@@ -36,6 +36,7 @@ fn loss(accuracy: Option<&DarkAccuracy>) -> Option<String> {
 
 /// Builds the table; it has no rows if there are fewer than two models.
 pub(super) fn best(findings: &Findings<'_>) -> Table {
+    let is_detected = findings.detected_best().is_some();
     let pairs = findings
         .best
         .iter()
@@ -79,10 +80,18 @@ pub(super) fn best(findings: &Findings<'_>) -> Table {
         .column(P, "csv p | page p", |row| row.pair.p)
         .column(Text, "csv p_by", |row| row.pair.p_by.to_string())
         .column(P, "csv p_holm | page p (Holm)", |row| row.pair.holm)
-        .column(Significance, "page", |row| row.pair.significance)
-        .column(Text, "csv verdict", |row| row.pair.significance.word())
+        .column(Significance, "page", |row| {
+            TableCell::verdict(row.best.verdict(row.pair, is_detected))
+        })
+        .column(Text, "csv verdict", |row| {
+            let verdict = row.best.verdict(row.pair, is_detected);
+            verdict.map_or("", |verdict| verdict.word())
+        })
         .column(Text, "csv shown", |row| {
-            row.pair.significance.is_shown().to_string()
+            let verdict = row.best.verdict(row.pair, is_detected);
+            verdict
+                .is_some_and(darkqa_score::significance::Significance::is_shown)
+                .to_string()
         })
         .column(Text, "csv levels", |row| {
             row.best

@@ -4,7 +4,7 @@ use super::pooled::too_few_clusters;
 use super::sections::{ENHANCERS, REAL};
 use crate::text::table::ColumnKind::{self, Count, Number, P, Percent, Points, Text};
 use crate::text::table::{Column, Table, TableBuilder, TableCell, TableFormat};
-use crate::text::words::name;
+use crate::text::words::{marked_reference, name};
 use crate::types::text::counted;
 use darkqa_score::choice::ParsingMode;
 use darkqa_score::cluster::ClusterUnit;
@@ -118,6 +118,10 @@ fn accuracy_titles(kind: ComparisonKind) -> (&'static str, Option<&'static str>)
             "Enhanced less raw",
             Some("Enhanced against raw, paired by question"),
         ),
+        ComparisonKind::EnhancerPair => (
+            "One enhancer less another",
+            Some("One enhancer against another, paired by question"),
+        ),
         ComparisonKind::Model => (
             "Model less model",
             Some("Model against model, paired by question"),
@@ -157,6 +161,10 @@ fn agreement_titles(kind: ComparisonKind) -> (&'static str, Option<&'static str>
         ComparisonKind::Enhancer => (
             "Agreement of enhanced less raw",
             Some("Agreement of enhanced against raw, paired by question"),
+        ),
+        ComparisonKind::EnhancerPair => (
+            "Agreement with one enhancer less another",
+            Some("Agreement with one enhancer against another, paired by question"),
         ),
         ComparisonKind::Model => ("Model less model", None),
         ComparisonKind::Blind => (
@@ -202,7 +210,7 @@ fn hide_rows_in_terminal(table: &mut Table, kind: ComparisonKind, comparisons: &
         shown.retain(|index| comparisons[*index].first.enhancer.is_none());
         let all_are_better = shown
             .iter()
-            .all(|index| comparisons[*index].strict.significance == Significance::Better);
+            .all(|index| comparisons[*index].verdict() == Some(Significance::Better));
         if !shown.is_empty() && all_are_better {
             let line = format!("better in all {} conditions", shown.len());
             table.notes.push(line);
@@ -229,19 +237,24 @@ fn table(
     mode: ParsingMode,
 ) -> Table {
     let section = match kind {
-        ComparisonKind::Enhancer => ENHANCERS,
+        ComparisonKind::Enhancer | ComparisonKind::EnhancerPair => ENHANCERS,
         ComparisonKind::RealSynthetic | ComparisonKind::RealEnhanced => REAL,
         _ => "comparisons",
     };
     let builder =
         TableBuilder::new("comparisons", comparisons.iter().copied()).page(section, caption);
-    let builder = number_columns(subject_columns(builder, kind), mode);
+    let has_models_under_test = comparisons.iter().any(|one| !one.first.is_reference());
+    let builder = number_columns(subject_columns(builder, kind, has_models_under_test), mode);
     builder
         .column(
             ColumnKind::Significance,
-            "csv verdict shown | terminal | page | latex",
-            move |comparison| comparison.parsed(mode).significance,
+            "csv verdict | terminal | page | latex",
+            |comparison| TableCell::verdict(comparison.verdict()),
         )
+        .column(Text, "csv shown", |comparison| {
+            let verdict = comparison.verdict();
+            verdict.is_some_and(Significance::is_shown).to_string()
+        })
         .column(Text, "csv mode", move |_| mode.name())
         .build()
 }
@@ -249,11 +262,16 @@ fn table(
 fn subject_columns(
     builder: TableBuilder<&Comparison>,
     kind: ComparisonKind,
+    has_models_under_test: bool,
 ) -> TableBuilder<&Comparison> {
     let builder = builder
         .column(Text, "csv kind", |comparison| comparison.kind.name())
-        .column(Text, "csv model | latex Model", |comparison| {
+        .column(Text, "csv model", |comparison| {
             comparison.first.model.clone()
+        })
+        .column(Text, "latex Model", move |comparison| {
+            let is_reference = comparison.first.is_reference() && has_models_under_test;
+            marked_reference(comparison.first.model.clone(), is_reference)
         })
         .column(Text, "csv condition | latex Condition", |comparison| {
             comparison.first.condition()
@@ -271,7 +289,8 @@ fn subject_columns(
             comparison.first.condition()
         });
     let builder = match kind {
-        ComparisonKind::Model
+        ComparisonKind::EnhancerPair
+        | ComparisonKind::Model
         | ComparisonKind::Blind
         | ComparisonKind::Light
         | ComparisonKind::RealSynthetic => {
@@ -349,6 +368,10 @@ fn second_side_label(comparison: &Comparison) -> String {
     match (first.model != second.model, comparison.kind) {
         (true, ComparisonKind::Light) => name(second),
         (true, _) => second.model.clone(),
+        (false, ComparisonKind::EnhancerPair) => second
+            .enhancer
+            .as_ref()
+            .map_or_else(String::new, ToString::to_string),
         (false, ComparisonKind::Light | ComparisonKind::RealSynthetic) => second.condition(),
         (false, _) => String::new(),
     }

@@ -1,6 +1,6 @@
-//! Tables of the question families and the frames that fail first in the dark, under each noise profile: [`fails_first`].
+//! Tables of the levels at which question families lose, and of the frames that keep the fewest right answers, under each noise profile:
+//! [`fails_first`]. Both are lists, not findings: no test compares one family or frame with another.
 
-use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
 use crate::text::table::ColumnKind::{Count, Percent, Text};
@@ -18,20 +18,13 @@ const MAX_FRAMES: usize = 5;
 /// Minimum number of right answers at L0, over all models, that a frame needs to be in the table (chosen).
 const MIN_RIGHT: usize = 3;
 
-/// Families by the level at which a loss is first detected, and the frames that lose most.
+/// The first level with a loss in each family, and the frames that keep the fewest right answers.
 pub(super) fn fails_first(findings: &Findings<'_>) -> [Table; 2] {
     [families(findings), frames(findings)]
 }
 
-/// Orders losses by level, then from the largest.
-fn compare_losses(one: &PooledFinding, other: &PooledFinding) -> Ordering {
-    let [one_value, other_value] = [one, other].map(|loss| loss.strict.difference.value);
-    one.level
-        .cmp(&other.level)
-        .then(one_value.total_cmp(&other_value))
-}
-
-/// A row for each family and a column for each variant. Families without a detected loss come last.
+/// A row for each family and a column for each variant. The rows are in the order of families, because a family with more questions reaches
+/// a small p at a lighter level.
 fn families(findings: &Findings<'_>) -> Table {
     let variants: Vec<(&Variant, BTreeMap<&Family, &PooledFinding>)> = findings
         .grid
@@ -39,31 +32,14 @@ fn families(findings: &Findings<'_>) -> Table {
         .into_iter()
         .map(|variant| (variant, first_losses(findings, variant)))
         .collect();
-    let mut families: Vec<(&Family, Option<&PooledFinding>)> = findings
-        .grid
-        .groups()
-        .into_iter()
-        .flatten()
-        .map(|family| {
-            let loss = variants
-                .iter()
-                .filter_map(|(_, losses)| losses.get(family).copied())
-                .min_by(|one, other| compare_losses(one, other));
-            (family, loss)
-        })
-        .collect();
-    families.sort_by(|(_, one), (_, other)| match (one, other) {
-        (Some(one), Some(other)) => compare_losses(one, other),
-        (one, other) => other.is_some().cmp(&one.is_some()),
-    });
-    let mut families: Vec<&Family> = families.into_iter().map(|(family, _)| family).collect();
+    let mut families: Vec<&Family> = findings.grid.groups().into_iter().flatten().collect();
     if families.len() < 2 {
         families.clear();
     }
     let mut builder = TableBuilder::new("families_first", families)
         .page(
             "families",
-            "Families that fail first: the first level with a detected loss from L0, in points",
+            "First level with a loss from L0 in each family, in points: a list, no comparison of families",
         )
         .column(Text, "terminal family | page family", |family| {
             family_name(Some(family)).to_owned()
@@ -77,7 +53,7 @@ fn families(findings: &Findings<'_>) -> Table {
         };
         builder = builder.column(Text, heads, move |family| {
             losses.get(family).map_or_else(
-                || "no loss detected".to_owned(),
+                || "no level".to_owned(),
                 |loss| {
                     let difference = loss.strict.difference;
                     let [value, low, high] =
@@ -89,9 +65,11 @@ fn families(findings: &Findings<'_>) -> Table {
     }
     let mut table = builder.build();
     if !table.rows.is_empty() {
-        table.heading = Some("Families that fail first".to_owned());
+        table.heading = Some("First level with a loss from L0, by family".to_owned());
         table.foot = Some(
-            "p < 0.05 after one correction over the families and levels of a column".to_owned(),
+            "p < 0.05 after one correction over the families and levels of a column; a family with more questions gets there at a lighter \
+             level, so the rows do not compare families"
+                .to_owned(),
         );
     }
     table
@@ -154,7 +132,7 @@ struct FrameRow<'f> {
     answers: FrameAnswers,
 }
 
-/// Frames that keep the fewest right answers in each variant of raw images, the worst first. This is descriptive, without a test.
+/// Frames that keep the fewest right answers in each variant of raw images.
 fn frames(findings: &Findings<'_>) -> Table {
     let rows = findings
         .grid
@@ -164,7 +142,7 @@ fn frames(findings: &Findings<'_>) -> Table {
     let mut table = TableBuilder::new("frames_first", rows)
         .page(
             "accuracy",
-            "Frames that fail first: the fewest right answers of L0 kept in the dark",
+            "Frames with the fewest right answers of L0 kept in the dark: a list, not a finding",
         )
         .group(|row| Some(light(row.variant, None)))
         .column(Text, "terminal frame | page frame", |row| {
@@ -183,14 +161,15 @@ fn frames(findings: &Findings<'_>) -> Table {
         })
         .build();
     if !table.rows.is_empty() {
-        table.heading = Some("Frames that fail first".to_owned());
-        table.foot =
-            Some("a description, no test: of many frames, some fail first by chance".to_owned());
+        table.heading = Some("Frames with the fewest right answers kept in the dark".to_owned());
+        table.foot = Some(
+            "a list, not a finding: of many frames, some keep few answers by chance".to_owned(),
+        );
     }
     table
 }
 
-/// Frames that keep the fewest right answers in a variant, the worst first.
+/// Frames that keep the fewest right answers in a variant, those with the fewest first.
 fn frame_rows<'f>(findings: &'f Findings<'_>, variant: &'f Variant) -> Vec<FrameRow<'f>> {
     let mut rows: Vec<FrameRow<'_>> = answers(findings, variant)
         .into_iter()
@@ -207,39 +186,6 @@ fn frame_rows<'f>(findings: &'f Findings<'_>, variant: &'f Variant) -> Vec<Frame
     });
     rows.truncate(MAX_FRAMES);
     rows
-}
-
-/// One line for each variant: the families that lose at the lowest level, and the frame that loses most. Variants with the same result
-/// share a line.
-pub(crate) fn first_to_fail(findings: &Findings<'_>) -> Vec<String> {
-    let findings = findings.shown();
-    let mut lines: Vec<(Vec<String>, String)> = Vec::new();
-    for variant in findings.grid.variants() {
-        let losses = first_losses(findings, variant);
-        let lowest = losses.values().map(|loss| loss.level).min();
-        let names: Vec<&str> = findings
-            .grid
-            .groups()
-            .into_iter()
-            .flatten()
-            .filter(|family| losses.get(family).map(|loss| loss.level) == lowest)
-            .map(|family| family_name(Some(family)))
-            .collect();
-        let families = lowest.map(|level| format!("{} at {level}", names.join(", ")));
-        let frames = frame_rows(findings, variant);
-        let frame = frames.first().map(|row| format!("frame {}", row.frame));
-        let failed: Vec<String> = families.into_iter().chain(frame).collect();
-        let failed = failed.join("; ");
-        match lines.iter_mut().find(|(_, other)| *other == failed) {
-            _ if failed.is_empty() => {}
-            Some((lights, _)) => lights.push(light(variant, None)),
-            None => lines.push((vec![light(variant, None)], failed)),
-        }
-    }
-    lines
-        .into_iter()
-        .map(|(lights, failed)| format!("{}: {failed}", lights.join(", ")))
-        .collect()
 }
 
 /// Counts the answers of the pooled models for each frame.

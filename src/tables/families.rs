@@ -4,7 +4,7 @@
 use crate::text::latex::escape;
 use crate::text::table::ColumnKind::{Percent, Text};
 use crate::text::table::{ColumnHeads, Table, TableBuilder, TableCell};
-use crate::text::words::family as family_name;
+use crate::text::words::{family as family_name, marked_reference};
 use crate::types::Family;
 use darkqa_score::choice::ParsingMode;
 use darkqa_score::findings::Findings;
@@ -12,13 +12,17 @@ use darkqa_score::model_in_condition::ModelInCondition;
 
 pub(super) fn families(findings: &Findings<'_>) -> Table {
     let subjects = findings.grid.subjects.iter().map(Some);
+    let has_models_under_test = subjects
+        .clone()
+        .flatten()
+        .any(|subject| !subject.is_reference());
     // The last row is chance.
     let mut builder = TableBuilder::new("families", subjects.chain([None]))
         .page("families", "Accuracy in % by family")
-        .column(Text, "page model | latex Model", |subject| {
-            subject
-                .map_or("chance", |subject| &subject.model)
-                .to_owned()
+        .column(Text, "page model", |subject| model(*subject))
+        .column(Text, "latex Model", |subject| {
+            let is_reference = subject.is_some_and(ModelInCondition::is_reference);
+            marked_reference(model(*subject), is_reference && has_models_under_test)
         })
         .column(Text, "page condition | latex Condition", |subject| {
             subject.map_or(String::new(), ModelInCondition::condition)
@@ -36,10 +40,17 @@ pub(super) fn families(findings: &Findings<'_>) -> Table {
     }
     let mut table = builder.build();
     table.latex = Some(
-        "Accuracy in \\% by family, with 95\\,\\% intervals. $\\downarrow$: shown to be below a model without images (its own, if it was asked so)."
+        "Accuracy in \\% by family, with 95\\,\\% intervals. $\\downarrow$: detected to be below a model without images (its own, if it was asked so)."
             .to_owned(),
     );
     table
+}
+
+/// Name of the model of a row.
+fn model(subject: Option<&ModelInCondition>) -> String {
+    subject
+        .map_or("chance", |subject| &subject.model)
+        .to_owned()
 }
 
 /// Accuracy of a subject on a family. No subject stands for chance, no family for all families.

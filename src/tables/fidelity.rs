@@ -7,6 +7,7 @@ use crate::types::View;
 use darkqa_score::auc::Auc;
 use darkqa_score::model_in_condition::ModelInCondition;
 use darkqa_score::photographs::{ConditionFidelity, FidelityFindings};
+use darkqa_score::significance::ALPHA;
 
 /// Measures in the order of [`ConditionFidelity::means`]: name in CSV files, and in texts.
 const MEASURES: [(&str, &str); 2] = [("psnr", "PSNR"), ("ssim", "SSIM")];
@@ -60,13 +61,10 @@ pub(super) fn fidelity(findings: Option<&FidelityFindings>) -> Option<Table> {
                 &*format!("csv {csv}_p_holm | page p (Holm)"),
                 move |row| row.predicts[index].map(|prediction| prediction.holm),
             )
-            .column(
-                Significance,
-                &*format!("csv {csv}_verdict | page verdict"),
-                move |row| {
-                    TableCell::from(row.predicts[index].map(|prediction| prediction.significance))
-                },
-            );
+            // No sentence is about a single condition, so there is no verdict.
+            .column(Significance, &*format!("csv {csv}_verdict"), |_| {
+                TableCell::Blank
+            });
     }
     let mut table = table.build();
     table.is_folded = true;
@@ -89,8 +87,14 @@ fn condition(row: &ConditionFidelity) -> String {
 /// Notes below the table: AUC within conditions, and rank correlation between conditions.
 pub(crate) fn notes(findings: &FidelityFindings) -> Vec<String> {
     let mut notes = Vec::new();
+    let is_detected = findings.p_report.is_some_and(|p| p < ALPHA);
     for (index, (_, name)) in MEASURES.into_iter().enumerate() {
-        notes.push(within_note(name, findings.within[index]));
+        // The sentences test PSNR alone.
+        notes.push(within_note(
+            name,
+            findings.within[index],
+            is_detected && index == 0,
+        ));
         if let Some(correlation) = findings.between[index] {
             let correlation = format!("{correlation:+.2}").replace('-', "−");
             notes.push(format!(
@@ -102,8 +106,8 @@ pub(crate) fn notes(findings: &FidelityFindings) -> Vec<String> {
     notes
 }
 
-/// Note on the AUC of a measure within conditions.
-fn within_note(name: &str, auc: Option<Auc>) -> String {
+/// Note on the AUC of a measure within conditions, and whether the sentences detect that it differs from chance.
+fn within_note(name: &str, auc: Option<Auc>, is_detected: bool) -> String {
     let Some(Auc { estimate, .. }) = auc else {
         return format!(
             "within conditions, too few right or wrong answers or clusters to know whether {name} tells them apart"
@@ -113,13 +117,11 @@ fn within_note(name: &str, auc: Option<Auc>) -> String {
         "AUC {:.2} [{:.2}, {:.2}]",
         estimate.value, estimate.low, estimate.high
     );
-    if estimate.low > 0.5 {
+    if is_detected && estimate.value > 0.5 {
         format!("within conditions, {name} tells right from wrong answers: {numbers}")
-    } else if estimate.high < 0.5 {
+    } else if is_detected {
         format!("within conditions, a higher {name} goes with wrong answers: {numbers}")
     } else {
-        format!(
-            "within conditions, it is not shown that {name} tells right from wrong answers: {numbers}, 0.5 is chance"
-        )
+        format!("within conditions, {name}: {numbers}, 0.5 is chance")
     }
 }

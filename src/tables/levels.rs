@@ -73,7 +73,7 @@ fn axis_table(
             line.sum(|cell| cell.failed)
         })
         .build();
-    add_always_right_rows(&mut table, ladder);
+    add_detail_rows(&mut table, ladder);
     let of = if axis == Axis::LIGHT {
         String::new()
     } else {
@@ -134,35 +134,51 @@ fn always_right(cell: &AccuracyCell) -> Option<String> {
     Some(percent(cell.always?.value))
 }
 
-/// Adds a row below each series whose questions were asked more than once: the share that was right every time. Only the terminal has
-/// these rows.
-fn add_always_right_rows(table: &mut Table, ladder: &Ladder<'_, AccuracyCell>) {
+/// Accuracy in percent if all missing replies were wrong, and if all were right; `None` if no reply is missing.
+fn range_of_missing(cell: &AccuracyCell) -> Option<String> {
+    let [wrong, right] = cell.bounds()?.map(percent);
+    Some(format!("{wrong}–{right}"))
+}
+
+/// Name of a detail of accuracies, and its text for an accuracy.
+type DetailRow = (&'static str, fn(&AccuracyCell) -> Option<String>);
+
+/// Adds rows below each series, where they have a value: the share of questions that was right every time, the range of accuracies that
+/// the missing replies allow, and the accuracy with all true answers weighted alike. Only the terminal has these rows.
+fn add_detail_rows(table: &mut Table, ladder: &Ladder<'_, AccuracyCell>) {
+    let details: [DetailRow; 3] = [
+        ("  balanced", |cell| cell.balanced.map(percent)),
+        ("  missing wrong–right", range_of_missing),
+        ("  right every time", always_right),
+    ];
     for (index, row) in ladder.rows().iter().enumerate().rev() {
         let LadderRow::Series(_, cells) = row else {
             continue;
         };
-        if cells.values().all(|cell| cell.always.is_none()) {
-            continue;
-        }
-        let shares = ladder.levels.iter().map(|level| {
-            match cells.get(level).and_then(|cell| always_right(cell)) {
-                Some(share) => TableCell::Text(share),
-                None => TableCell::Blank,
+        for (name, value) in details {
+            if cells.values().all(|cell| value(cell).is_none()) {
+                continue;
             }
-        });
-        let names = [
-            TableCell::Blank,
-            "  right every time".into(),
-            TableCell::Blank,
-            TableCell::Blank,
-        ];
-        let row = TableRow {
-            cells: names.into_iter().chain(shares).collect(),
-            group: table.rows[index].group.clone(),
-            hidden_in: vec![TableFormat::Page, TableFormat::Latex],
-            ..TableRow::default()
-        };
-        table.rows.insert(index + 1, row);
+            let values = ladder.levels.iter().map(|level| {
+                match cells.get(level).and_then(|cell| value(cell)) {
+                    Some(value) => TableCell::Text(value),
+                    None => TableCell::Blank,
+                }
+            });
+            let names = [
+                TableCell::Blank,
+                name.into(),
+                TableCell::Blank,
+                TableCell::Blank,
+            ];
+            let row = TableRow {
+                cells: names.into_iter().chain(values).collect(),
+                group: table.rows[index].group.clone(),
+                hidden_in: vec![TableFormat::Page, TableFormat::Latex],
+                ..TableRow::default()
+            };
+            table.rows.insert(index + 1, row);
+        }
     }
 }
 

@@ -37,7 +37,6 @@ pub(crate) use baseline::baseline;
 pub(crate) use comparisons::agreement_comparisons;
 pub(crate) use enhancers::EnhancerRow;
 pub(crate) use enhancers::enhancers;
-pub(crate) use fails_first::first_to_fail;
 pub(crate) use flips::{FLIPS, write_flips};
 pub(crate) use health::health;
 pub(crate) use levels::unread_note;

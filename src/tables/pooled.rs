@@ -4,14 +4,15 @@ use std::collections::BTreeSet;
 
 use crate::sentences::left_out;
 use crate::text::table::ColumnKind::{self, Count, Number, P, Percent, Points, Text};
-use crate::text::table::{Table, TableBuilder};
+use crate::text::table::{Table, TableBuilder, TableCell};
 use crate::text::words::{light, p};
+use crate::types::EnhancerName;
 use crate::types::text::counted;
 use darkqa_score::answers::confusion::FalseAnswer;
 use darkqa_score::choice::ParsingMode;
 use darkqa_score::comparisons::{PooledFinding, PooledKind};
 use darkqa_score::findings::Findings;
-use darkqa_score::significance::SwapMethod;
+use darkqa_score::significance::{Significance, SwapMethod};
 
 /// Three tables: all families together, by family, and both with lenient parsing (in files only).
 pub(super) fn pooled(findings: &Findings<'_>) -> Vec<Table> {
@@ -73,21 +74,20 @@ fn table(caption: &str, models: &str, findings: &[&PooledFinding], mode: Parsing
         })
         .column(Text, "csv level", |finding| levels(finding))
         .column(Text, "csv variant", |finding| finding.variant.to_string())
-        .column(Text, "csv enhancer", |finding| {
-            finding.enhancer.as_ref().map(ToString::to_string)
-        })
+        .column(Text, "csv enhancer", |finding| enhancers(finding))
         .column(Text, "terminal | page difference", |finding| title(finding))
         .family(|finding| finding.family.as_ref())
         .column(Count, models, |finding| finding.models.len());
     number_columns(builder, mode)
         .column(ColumnKind::Significance, "terminal | page", |finding| {
-            finding.parsed(mode).verdict
+            TableCell::verdict(finding.verdict())
         })
         .column(Text, "csv verdict", |finding| {
-            finding.parsed(mode).verdict.word()
+            finding.verdict().map_or("", Significance::word)
         })
         .column(Text, "csv shown", |finding| {
-            finding.parsed(mode).verdict.is_shown().to_string()
+            let verdict = finding.verdict();
+            verdict.is_some_and(Significance::is_shown).to_string()
         })
         .column(Text, "csv names", |finding| finding.models.join(";"))
         .column(Text, "csv mode", |_| mode.name())
@@ -139,6 +139,15 @@ fn levels(finding: &PooledFinding) -> String {
     }
 }
 
+/// The enhancer of a finding, or the two of which the second is subtracted, as in `lift − zerodce`.
+fn enhancers(finding: &PooledFinding) -> Option<String> {
+    let enhancer = finding.enhancer.as_ref()?;
+    Some(match &finding.against {
+        None => enhancer.to_string(),
+        Some(against) => format!("{enhancer} − {against}"),
+    })
+}
+
 /// Both sides of the difference, as in `L3 with noise − L0`.
 fn title(finding: &PooledFinding) -> String {
     let first = light(&finding.variant, finding.enhancer.as_ref());
@@ -147,6 +156,7 @@ fn title(finding: &PooledFinding) -> String {
         PooledKind::Hallucination(answer) => return false_answers(finding, &first, answer),
         PooledKind::Noise => "exposure drop",
         PooledKind::Enhancer => "raw",
+        PooledKind::EnhancerPair => finding.against.as_ref().map_or("", EnhancerName::as_str),
         PooledKind::Blind => "without images",
     };
     format!("{} {first} − {second}", levels(finding))

@@ -2,11 +2,12 @@
 
 use crate::text::table::ColumnKind::{Count, Percent, Share, Text};
 use crate::text::table::{Table, TableBuilder, TableCell};
+use crate::text::words::percent;
 use darkqa_score::accuracies::AccuracySummary;
 use darkqa_score::choice::ParsingMode;
 
 pub(super) fn subjects(summary: &AccuracySummary) -> Table {
-    let mut table = TableBuilder::new("subjects", summary.family_cells(None, ParsingMode::Strict))
+    let builder = TableBuilder::new("subjects", summary.family_cells(None, ParsingMode::Strict))
         .page(
             "accuracy",
             "Accuracy of every subject, all families together",
@@ -29,8 +30,17 @@ pub(super) fn subjects(summary: &AccuracySummary) -> Table {
         })
         .column(Count, "page n", |cell| cell.replies())
         .column(Count, "page not readable", |cell| cell.unparsed)
-        .column(Count, "page failed", |cell| cell.failed)
-        .build();
+        .column(Count, "page failed", |cell| cell.failed);
+    let has_bounds = summary.cells.iter().any(|cell| cell.bounds().is_some());
+    let builder = if has_bounds {
+        builder.column(Text, "page if failed are wrong–right", |cell| {
+            let [wrong, right] = cell.bounds()?.map(percent);
+            Some(format!("{wrong}–{right}"))
+        })
+    } else {
+        builder
+    };
+    let mut table = builder.build();
     table.is_folded = true;
     table
 }

@@ -1,6 +1,6 @@
 //! Table of all accuracies: `summary.csv`, and the rows of `summary.json`.
 
-use crate::text::table::ColumnKind::{Count, Share, Text};
+use crate::text::table::ColumnKind::{Count, Number, Share, Text};
 use crate::text::table::{SUMMARY, Table, TableBuilder, TableCell};
 use crate::types::{ModelListing, PairDark, RunGroup};
 use darkqa_score::accuracies::{AccuracyCell, AccuracySummary};
@@ -25,6 +25,18 @@ pub(crate) fn summary(summary: &AccuracySummary, listing: &ModelListing) -> Tabl
         .column(Share, "csv value low high", |cell| cell.accuracy);
     let builder = if summary.cells.iter().any(|cell| cell.always.is_some()) {
         builder.column(Share, "csv always", |cell| cell.always)
+    } else {
+        builder
+    };
+    let builder = if summary.unbalanced.is_empty() {
+        builder
+    } else {
+        builder.column(Number, "csv balanced", |cell| cell.balanced)
+    };
+    let builder = if summary.cells.iter().any(|cell| cell.bounds().is_some()) {
+        builder
+            .column(Number, "csv if_wrong", |cell| Some(cell.bounds()?[0]))
+            .column(Number, "csv if_right", |cell| Some(cell.bounds()?[1]))
     } else {
         builder
     };

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::text::table::ColumnKind::{Number, Share, Text, Threshold};
+use crate::text::table::ColumnKind::{Number, Percent, Share, Text, Threshold};
 use crate::text::table::{Table, TableBuilder, TableCell};
 use crate::text::words::light;
 use crate::types::AxisLevel;
@@ -37,7 +37,7 @@ fn axis_tables(findings: &Findings<'_>, axis: Axis, curves: Vec<&Curve>) -> [Tab
     let (all_families, by_family): (Vec<&Curve>, Vec<&Curve>) =
         curves.into_iter().partition(|curve| curve.family.is_none());
     let heading = format!(
-        "{} in {} (half-way from L0 to chance) and mean accuracy in %, with 95 % intervals by {}",
+        "{} in {} (half-way from L0 to the floor) and mean accuracy in %, with 95 % intervals by {}",
         titles.quantity, axis.unit, findings.unit
     );
     let mut all_families = table(&titles, titles.caption, &all_families, ParsingMode::Strict);
@@ -114,6 +114,14 @@ fn table(titles: &Titles, caption: &str, curves: &[&Curve], mode: ParsingMode) -
             "csv area area_low area_high n | terminal mean accuracy | page area in % [95 %]",
             |curve| curve.parsed(mode).area,
         )
+        .column(
+            Percent,
+            "csv floor | terminal floor | page floor in %",
+            |curve| curve.parsed(mode).floor,
+        )
+        .column(Text, "csv floor_of | terminal of | page of", |curve| {
+            floor_of(curve)
+        })
         .column(Text, titles.range_column, |curve| {
             format!("0–{}", curve.parsed(mode).darkest.value())
         })
@@ -122,11 +130,21 @@ fn table(titles: &Titles, caption: &str, curves: &[&Curve], mode: ParsingMode) -
         .build()
 }
 
+/// What the floor of a curve is the accuracy of.
+fn floor_of(curve: &Curve) -> &'static str {
+    if curve.floor_is_blind {
+        "no image"
+    } else {
+        "guessing"
+    }
+}
+
 /// Text for the reason why a curve has no threshold.
 pub(crate) fn missing_threshold_reason(reason: &NoThreshold) -> String {
     match reason {
-        NoThreshold::NotAboveChance => "not clearly above chance at L0".to_owned(),
+        NoThreshold::NotAboveChance => "not clearly above the floor at L0".to_owned(),
         NoThreshold::Thin(level) => thin_level_text(level),
+        NoThreshold::Missing { low } => format!("from {low:.1} on, by the missing replies"),
     }
 }
 

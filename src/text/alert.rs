@@ -27,6 +27,8 @@ impl Alert {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum AlertKind {
+    /// More than 2 % of the replies missing in a condition.
+    MissingReplies,
     /// Replies that do not depend on the image.
     ImageIgnored,
     /// A run that is named twice, or that adds no reply to the other runs.
@@ -43,6 +45,8 @@ pub enum AlertKind {
     NoChoice,
     /// Replies whose lenient parsing differs in this version.
     Reading,
+    /// An answer that is true so often that a constant reply scores well.
+    Answers,
     /// Fewer clusters than an interval needs.
     Clusters,
     /// Models that did not answer the same questions.

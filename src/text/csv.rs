@@ -8,6 +8,7 @@ use serde::{Serialize, Serializer};
 use crate::error::{Error, Result};
 use crate::text::table::{SUMMARY, Table, TableCell};
 use crate::types::text::{escape_where, is_hidden};
+use darkqa_score::significance::Significance;
 
 /// One field of a row. Numbers have enough digits to be parsed without loss.
 #[derive(Debug, Clone, Copy, Serialize)]
@@ -41,7 +42,7 @@ pub(crate) fn fields(cell: &TableCell, names: usize) -> impl Iterator<Item = Csv
         TableCell::Number(number) => fields[0] = CsvField::Number(*number),
         TableCell::Significance(verdict) => {
             // `tied` is kept for one release; the column `shown` states its meaning.
-            let word = if verdict.is_shown() {
+            let word = if verdict.is_shown() || *verdict == Significance::Missing {
                 verdict.word()
             } else {
                 "tied"

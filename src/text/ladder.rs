@@ -4,11 +4,11 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::text::table::ColumnKind::Text;
 use crate::text::table::{ColumnKind, TableBuilder, TableCell, TableFormat};
-use crate::text::words::light;
+use crate::text::words::{light, marked_reference};
 use crate::types::degradations::{Axis, Kind};
 use crate::types::{AxisLevel, EnhancerName, ModelListing, RunGroup, SetLight, Variant, View};
 use darkqa_score::findings::Findings;
-use darkqa_score::model_in_condition::ModelInCondition;
+use darkqa_score::model_in_condition::{CHANCE, ModelInCondition, is_reference};
 use darkqa_score::photographs::pair_darkness::PairDarkness;
 
 /// A model in one variant, raw or with one enhancer.
@@ -229,6 +229,10 @@ impl<'a, C> Ladder<'a, C> {
         listing: &ModelListing,
         cell: impl Fn(Option<&C>) -> TableCell,
     ) -> TableBuilder<LadderRow<'a, C>> {
+        let has_models_under_test = self
+            .models
+            .iter()
+            .any(|model| !is_reference(model) && *model != CHANCE);
         let mut table = TableBuilder::new(name, self.rows())
             .hide(TableFormat::Terminal, |line| {
                 matches!(line, LadderRow::WithoutLevel(..))
@@ -238,7 +242,10 @@ impl<'a, C> Ladder<'a, C> {
                 listing.label(line.model())
             })
             .column(Text, "page light | terminal light", |line| line.light(self))
-            .column(Text, "latex Model", |line| line.label(listing))
+            .column(Text, "latex Model", |line| {
+                let is_reference = is_reference(line.model()) && has_models_under_test;
+                marked_reference(line.label(listing), is_reference)
+            })
             .column(Text, "latex Light", |line| match line {
                 LadderRow::Series(series, _) => TableCell::from(self.light(series)),
                 LadderRow::WithoutLevel(..) => TableCell::Blank,

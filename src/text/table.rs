@@ -167,6 +167,13 @@ cell_from! {
     Significance => Significance,
 }
 
+impl TableCell {
+    /// The verdict of a comparison; blank if no sentence is about it.
+    pub(crate) fn verdict(verdict: Option<Significance>) -> Self {
+        verdict.map_or(Self::Blank, Self::Significance)
+    }
+}
+
 impl<C: Into<Self>> From<Option<C>> for TableCell {
     fn from(cell: Option<C>) -> Self {
         cell.map_or(Self::Missing, C::into)

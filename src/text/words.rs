@@ -4,6 +4,7 @@ use crate::text::table::{ColumnKind, TableCell};
 use crate::types::{EnhancerName, Family, Variant};
 use darkqa_score::estimate::Estimate;
 use darkqa_score::model_in_condition::ModelInCondition;
+use darkqa_score::significance::ALPHA;
 
 /// Title of a variant and its enhancer, such as `with noise + lift`.
 pub(crate) fn light(variant: &Variant, enhancer: Option<&EnhancerName>) -> String {
@@ -37,6 +38,15 @@ pub(crate) fn name(subject: &ModelInCondition) -> String {
     format!("{} {}", subject.model, subject.condition())
 }
 
+/// Name of a model in figures and LaTeX tables, which is marked if it is a reference beside models under test.
+pub(crate) fn marked_reference(name: String, is_reference: bool) -> String {
+    if is_reference {
+        format!("{name} (reference)")
+    } else {
+        name
+    }
+}
+
 /// Shortens a name to `width` characters by replacing its middle with `…`. Shorter names are unchanged.
 pub(crate) fn shorten_middle(name: &str, width: usize) -> String {
     let chars: Vec<char> = name.chars().collect();
@@ -61,6 +71,28 @@ pub(crate) fn percent(share: f64) -> String {
     }
 }
 
+/// The ends of the interval of a share in percent, with one decimal, or as many as it takes to print an interval that has a width.
+pub(crate) fn share_ends(low: f64, high: f64) -> [String; 2] {
+    let decimals = share_decimals(low, high);
+    [low, high].map(|end| match decimals {
+        1 => percent(end),
+        _ => format!("{:.decimals$}", 100.0 * end).replace('-', "−"),
+    })
+}
+
+/// Number of decimals with which the ends of an interval of a share, in percent, differ; 1 for an interval without a width.
+pub(crate) fn share_decimals(low: f64, high: f64) -> usize {
+    (1..MAX_SHARE_DECIMALS)
+        .find(|decimals| {
+            let [low, high] = [low, high].map(|end| format!("{:.decimals$}", 100.0 * end));
+            low != high
+        })
+        .unwrap_or(1)
+}
+
+/// Maximum number of decimals of a share in percent (chosen).
+const MAX_SHARE_DECIMALS: usize = 6;
+
 /// True if a condition (`L3-noise+lift`) or the title of a variant (`with noise + lift`) names this enhancer.
 pub(crate) fn names_enhancer(text: &str, enhancer: &str) -> bool {
     text.split([' ', '+']).any(|word| word == enhancer)
@@ -80,14 +112,23 @@ pub(crate) fn ends_in_points(difference: Estimate) -> String {
     format!("{}, {}", points(difference.low), points(difference.high))
 }
 
-/// A p-value with three decimals, or `< 0.001`.
+/// A p-value with three decimals, or `< 0.001`. A value below 0.05 has as many decimals as it takes to stay below 0.05, because a result
+/// is detected if and only if p is below 0.05.
 pub(crate) fn p(value: f64) -> String {
     if value < 0.001 {
-        "< 0.001".to_owned()
-    } else {
-        format!("{value:.3}")
+        return "< 0.001".to_owned();
     }
+    (3..MAX_P_DECIMALS)
+        .map(|decimals| format!("{value:.decimals$}"))
+        .find(|text| {
+            let printed = text.parse::<f64>();
+            value >= ALPHA || printed.is_ok_and(|printed| printed < ALPHA)
+        })
+        .unwrap_or_else(|| format!("< {ALPHA}"))
 }
+
+/// Maximum number of decimals of a p-value (chosen).
+const MAX_P_DECIMALS: usize = 7;
 
 /// Interval of an exposure drop in EV, such as `1.2 to 3.4`; `–` if the lower end is infinite (beyond the darkest level).
 pub(crate) fn reach(low: f64, high: f64, darkest: f64) -> String {
@@ -107,9 +148,13 @@ pub(crate) fn stops(value: f64, darkest: f64) -> String {
     }
 }
 
-/// A share in percent with its interval, such as `96.4 [93.0, 98.2]`.
+/// A share in percent with its interval, such as `96.4 [93.0, 98.2]`; without an interval if the share is known exactly.
 pub(crate) fn with_interval(share: Estimate) -> String {
-    let [value, low, high] = [share.value, share.low, share.high].map(percent);
+    let value = percent(share.value);
+    if share.high <= share.low {
+        return value;
+    }
+    let [low, high] = share_ends(share.low, share.high);
     format!("{value} [{low}, {high}]")
 }
 
@@ -146,7 +191,8 @@ pub(crate) fn widest_reach_of(shares: impl Iterator<Item = Estimate>) -> String 
 
 /// Interval of a share in percent, such as `93.0–98.2`.
 pub(crate) fn ends(share: Estimate) -> String {
-    format!("{}–{}", percent(share.low), percent(share.high))
+    let [low, high] = share_ends(share.low, share.high);
+    format!("{low}–{high}")
 }
 
 /// Formats a table cell, by the kind of its column.
@@ -186,6 +232,9 @@ fn format_number(kind: ColumnKind, number: f64) -> String {
 
 /// An estimate with its interval; columns of kind `Percent` and `Accuracy` have no interval.
 fn format_estimate(kind: ColumnKind, estimate: Estimate) -> String {
+    if kind == ColumnKind::Share {
+        return with_interval(estimate);
+    }
     let [value, low, high] =
         [estimate.value, estimate.low, estimate.high].map(|number| format_number(kind, number));
     match kind {
@@ -216,5 +265,35 @@ mod tests {
     fn zero_percent_has_no_sign() {
         assert_eq!(percent(-0.0004), "0.0");
         assert_eq!(percent(-0.0006), "−0.1");
+    }
+
+    #[test]
+    fn p_never_rounds_to_the_other_side_of_the_level() {
+        for (value, text) in [
+            (0.0004, "< 0.001"),
+            (0.036, "0.036"),
+            (0.0494, "0.049"),
+            (0.0496, "0.0496"),
+            (0.049_97, "0.04997"),
+            (0.049_999_999_9, "< 0.05"),
+            (0.05, "0.050"),
+            (0.0501, "0.050"),
+        ] {
+            assert_eq!(p(value), text);
+        }
+    }
+
+    #[test]
+    fn an_interval_of_a_share_has_a_width() {
+        let share = |low, high| Estimate {
+            value: low,
+            low,
+            high,
+            n: 20_000,
+        };
+        assert_eq!(with_interval(share(0.0, 0.000_19)), "0.0 [0.00, 0.02]");
+        assert_eq!(ends(share(0.999_999, 1.0)), "99.9999–100.0000");
+        assert_eq!(with_interval(share(0.9, 1.0)), "90.0 [90.0, 100.0]");
+        assert_eq!(with_interval(share(0.25, 0.25)), "25.0");
     }
 }

@@ -205,9 +205,9 @@ fn estimate_names_built_in_models() {
     insta::assert_snapshot!(redacted(&said), @"
     Nothing was sent. 70 of 70 trials are left to ask.
     at no endpoint, built in: observer 30, observer:other-room 30, random (blind) 10
-    power: 10 questions in 3 frames detects no difference between two conditions; 5 points need about 292 frames
+    power: 10 questions in 2 scenes detects no difference between two conditions; 5 points need about 217 scenes
         (one model; level 2.50 % after correction; assumed: 20 % of answers change without an effect, correlation
-        0.05 in a frame)
+        0.05 in a scene)
     only 3 frames (8 are needed): intervals and tests would be rough
     ");
 }

@@ -7,7 +7,6 @@ use crate::error::Result;
 use crate::text::script::to_script_json;
 use crate::text::words::{percent, with_interval};
 use crate::types::degradations::Axis;
-use darkqa_score::estimate::Estimate;
 
 /// A line chart as data. Shares are between 0 and 1. Texts are formatted as in tables, so that the script rounds nothing.
 #[derive(Debug, Clone, Serialize)]
@@ -119,7 +118,7 @@ fn line_data(line: &PlotLine) -> LineData {
                 .map(|(level, share)| PointData {
                     x: [level.value(); 3],
                     y: [share.value, share.low, share.high],
-                    text: share_text(*share),
+                    text: with_interval(*share),
                 })
                 .collect(),
         },
@@ -129,7 +128,7 @@ fn line_data(line: &PlotLine) -> LineData {
                 .map(|mark| PointData {
                     x: mark.ev,
                     y: [mark.share.value, mark.share.low, mark.share.high],
-                    text: share_text(mark.share),
+                    text: with_interval(mark.share),
                 })
                 .collect(),
         },
@@ -141,12 +140,4 @@ fn line_data(line: &PlotLine) -> LineData {
         items: line.items.clone(),
         content,
     }
-}
-
-/// Formats a share as in tables, without an interval if it is known exactly.
-fn share_text(share: Estimate) -> String {
-    if share.high <= share.low {
-        return percent(share.value);
-    }
-    with_interval(share)
 }

@@ -28,10 +28,8 @@ impl FigureBuilder<'_> {
                     }
                 }
                 if lines.len() > 1 {
-                    let (name, light) = (
-                        self.names.display_name(model),
-                        self.condition_text(&variant, None),
-                    );
+                    let (name, light) =
+                        (self.curve_name(model), self.condition_text(&variant, None));
                     let title = format!("{name}, {light}, n {}", self.item_count(None));
                     panels.push(Panel {
                         title,

@@ -16,14 +16,16 @@ use std::collections::BTreeSet;
 
 use crate::drawing::chart::figure_chart::FigureChart;
 use crate::drawing::chart::{Chart, DarkMark, LineContent, LineItems, LineStyle, Panel, PlotLine};
-use crate::text::words::{family as family_name, light_with, names_enhancer};
+use crate::text::words::{family as family_name, light_with, marked_reference, names_enhancer};
 use crate::types::degradations::{Axis, Kind};
 use crate::types::text::counted;
 use crate::types::{AxisLevel, EnhancerName, Family, Variant, View};
 use darkqa_score::choice::ParsingMode;
 use darkqa_score::estimate::Estimate;
 use darkqa_score::findings::Findings;
-use darkqa_score::model_in_condition::{CHANCE, ModelInCondition, pooled_models};
+use darkqa_score::model_in_condition::{
+    CHANCE, ModelInCondition, models_under_test, pooled_models,
+};
 
 use mean::mean;
 pub(crate) use names::{KnownNames, Names};
@@ -91,8 +93,10 @@ const ACCURACY: &str = "accuracy in %";
 /// Makes figures from findings: keeps the models, enhancers and levels that occur in them.
 struct FigureBuilder<'a> {
     findings: &'a Findings<'a>,
-    /// Models that were shown images, in display order. The index of a model is its line style.
+    /// Models that were shown images, in display order, references last. The index of a model is its line style.
     models: Vec<&'a str>,
+    /// Number of models under test, which come first.
+    under_test: usize,
     enhancers: Vec<&'a EnhancerName>,
     levels: BTreeSet<AxisLevel>,
     names: Names,
@@ -124,6 +128,9 @@ impl<'a> FigureBuilder<'a> {
             .collect();
         models.dedup();
         names.sort(&mut models, |model| model);
+        // References come last, so that the other models look the same with and without them.
+        let under_test = models_under_test(models.iter().copied());
+        models.sort_by_key(|model| !under_test.contains(model));
         let enhancers: BTreeSet<&EnhancerName> = subjects
             .iter()
             .filter_map(|s| s.enhancer.as_ref())
@@ -132,6 +139,7 @@ impl<'a> FigureBuilder<'a> {
         names.sort(&mut enhancers, |name| name.as_str());
         Self {
             findings,
+            under_test: under_test.len(),
             models,
             enhancers,
             names: names.clone(),
@@ -240,7 +248,21 @@ impl<'a> FigureBuilder<'a> {
             return LineStyle::BLACK;
         }
         let index = self.models.iter().position(|known| *known == model);
-        LineStyle(index.unwrap_or(self.models.len()))
+        let index = index.unwrap_or(self.models.len());
+        if self.is_reference(model) {
+            return LineStyle::built_in(index - self.under_test);
+        }
+        LineStyle(index)
+    }
+
+    /// True for a built-in model that is a reference beside the models under test.
+    fn is_reference(&self, model: &str) -> bool {
+        self.models[self.under_test..].contains(&model)
+    }
+
+    /// Name of a model's curve, which says of a reference that it is one.
+    fn curve_name(&self, model: &str) -> String {
+        marked_reference(self.names.display_name(model), self.is_reference(model))
     }
 
     /// Text for a variant and an enhancer, as in "exposure drop with sensor noise, enhanced".
@@ -268,7 +290,7 @@ impl<'a> FigureBuilder<'a> {
         self.models
             .iter()
             .map(|model| PlotLine {
-                name: self.names.display_name(model),
+                name: self.curve_name(model),
                 style: self.style(model),
                 content: LineContent::Curve(self.points(model, variant, None, &mut value)),
                 model: Some((*model).to_owned()),
@@ -307,7 +329,7 @@ impl<'a> FigureBuilder<'a> {
                     .collect();
                 if !marks.is_empty() {
                     lines.push(PlotLine {
-                        name: format!("{}, {} (real)", self.names.display_name(model), pair.name),
+                        name: format!("{}, {} (real)", self.curve_name(model), pair.name),
                         style: self.style(model),
                         content: LineContent::Marks(marks),
                         model: Some((*model).to_owned()),

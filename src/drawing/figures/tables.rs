@@ -12,8 +12,10 @@ use darkqa_score::choice::ParsingMode;
 use darkqa_score::comparisons::PooledKind;
 use darkqa_score::estimate::Estimate;
 use darkqa_score::findings::Findings;
+use darkqa_score::significance::Significance;
+
 /// Caption sentence about the mark ↓.
-const BELOW: &str = "↓: shown to be below the answers without images.";
+const BELOW: &str = "↓: detected to be below the answers without images.";
 
 /// All tables that have data: accuracy by level, accuracy by family at L0 and at the darkest level, and a table for each enhancer.
 pub(crate) fn paper_tables(findings: &Findings<'_>, names: &Names) -> Vec<Table> {
@@ -130,7 +132,7 @@ impl FigureBuilder<'_> {
                     .map(|level| cells.remove(level).unwrap_or(TableCell::Blank));
                 TableRow {
                     is_best: self.is_best(model, variant),
-                    ..row(self.names.display_name(model), None, numbers)
+                    ..row(self.curve_name(model), None, numbers)
                 }
             })
             .chain(self.without_images(levels.len()))
@@ -140,7 +142,7 @@ impl FigureBuilder<'_> {
             .map(|level| format!("{level} {}", level.value()))
             .collect();
         let caption = format!(
-            "Accuracy in % by level, {} ({} in {}: {}). {} {BELOW} Bold: shown to be better than every other model over the levels.",
+            "Accuracy in % by level, {} ({} in {}: {}). {} {BELOW} Bold: detected to be better than every other model in the dark.",
             self.condition_text(variant, None),
             axis.title,
             axis.unit,
@@ -172,12 +174,8 @@ impl FigureBuilder<'_> {
 
     /// True if the model is detected to be better than every other model in the variant.
     fn is_best(&self, model: &str, variant: &Variant) -> bool {
-        self.findings.best.as_ref().is_some_and(|best| {
-            best.variant == *variant
-                && best.models.len() > 1
-                && best.not_shown_better_than.is_empty()
-                && best.leader().model == model
-        })
+        let best = self.findings.detected_best();
+        best.is_some_and(|best| best.variant == *variant && best.leader().model == model)
     }
 
     /// Accuracy of each model by family, at L0 and at the darkest level of the variant.
@@ -197,11 +195,7 @@ impl FigureBuilder<'_> {
                 let numbers = families
                     .iter()
                     .map(|family| self.family_cell(model, level, variant, family));
-                row(
-                    self.names.display_name(model),
-                    Some(&level.to_string()),
-                    numbers,
-                )
+                row(self.curve_name(model), Some(&level.to_string()), numbers)
             })
             .collect();
         let caption = format!(
@@ -277,7 +271,8 @@ impl FigureBuilder<'_> {
         let effects = levels.iter().map(|level| {
             let finding = pooled.iter().find(|finding| finding.level == *level);
             finding.map_or(TableCell::Blank, |finding| {
-                TableCell::Effect(finding.strict.difference, finding.strict.verdict)
+                let verdict = finding.verdict().unwrap_or(Significance::NotShown);
+                TableCell::Effect(finding.strict.difference, verdict)
             })
         });
         let effect_row = row(name, None, effects);
@@ -291,11 +286,11 @@ impl FigureBuilder<'_> {
                             TableCell::Estimate(*accuracy)
                         })
                     });
-                    row(self.names.display_name(model), Some(""), numbers)
+                    row(self.curve_name(model), Some(""), numbers)
                 });
         let rows = std::iter::once(effect_row).chain(model_rows).collect();
         let caption = format!(
-            "Effect of {} in points, and accuracy with it in %, {}. {} Bold: a difference that is shown (p < 0.05 after Holm's correction over the levels).",
+            "Effect of {} in points, and accuracy with it in %, {}. {} Bold: a difference that is detected (p < 0.05 after one correction over all tests of the report).",
             self.names.display_name(enhancer.as_str()),
             self.condition_text(variant, None),
             self.basis()

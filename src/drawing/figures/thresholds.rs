@@ -53,7 +53,7 @@ impl FigureBuilder<'_> {
                 let darkest = curve.summary.darkest.value();
                 let light = self.condition_text(&curve.variant, curve.enhancer.as_ref());
                 Some(ThresholdRow {
-                    name: format!("{}, {light}", self.names.display_name(&curve.model)),
+                    name: format!("{}, {light}", self.curve_name(&curve.model)),
                     threshold,
                     text: format!(
                         "{} [{}, {}]",
@@ -70,13 +70,13 @@ impl FigureBuilder<'_> {
         let (name, caption) = if axis == Axis::MOTION {
             (
                 "blur_thresholds",
-                "Threshold of motion blur: the exposure time at which accuracy is half-way between that at L0 and chance. Arrows: \
+                "Threshold of motion blur: the exposure time at which accuracy is half-way between that at L0 and that without images (or guessing, if that is higher). Arrows: \
                  beyond the longest time asked.",
             )
         } else {
             (
                 "thresholds",
-                "Darkness threshold: the exposure drop at which accuracy is half-way between that at L0 and chance. Arrows: \
+                "Darkness threshold: the exposure drop at which accuracy is half-way between that at L0 and that without images (or guessing, if that is higher). Arrows: \
                  beyond the darkest level asked.",
             )
         };

@@ -86,7 +86,7 @@ impl Look {
         let LineStyle(number) = style;
         match self.palette {
             Palette::Colour => style.rgb(),
-            _ if [LineStyle::BLACK, LineStyle::REFERENCE].contains(&style) => style.rgb(),
+            _ if style.is_ink() => style.rgb(),
             Palette::Grey => [GREYS[number % GREYS.len()]; 3],
         }
     }

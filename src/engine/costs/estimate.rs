@@ -17,7 +17,7 @@ use crate::images::trials::{Item as _, Plan};
 use crate::report::forecast::{CostLine, FewSources, Forecast, ProfileCost, StoreForecast};
 use crate::store::StoredTrial;
 use crate::types::{Degradation, ImageFacts, ProfileName, View};
-use darkqa_score::cluster::MIN_SCENES;
+use darkqa_score::cluster::MIN_CLUSTERS;
 
 /// Assumed latency of a reply in seconds, if no reply is stored.
 const REPLY_SECONDS: f64 = 2.0;
@@ -70,10 +70,10 @@ pub(crate) fn estimate<E: Experiment>(
     let limit = image_limit(settings);
     let planned: usize = plans.iter().map(|plan| plan.keys.len()).sum();
     let remaining: usize = plans.iter().map(Plan::remaining).sum();
-    let is_few = experiment.part().is_none() && sources.len() < MIN_SCENES;
+    let is_few = experiment.part().is_none() && sources.len() < MIN_CLUSTERS;
     let few_sources = FewSources {
         number: sources.len(),
-        needed: MIN_SCENES,
+        needed: MIN_CLUSTERS,
         of: E::SOURCE,
     };
     Ok(Forecast {

@@ -12,7 +12,6 @@ use crate::error::Result;
 use crate::report::choice_report::ChoiceReport;
 use crate::report::finding_groups::{Effect, Finding, FindingGroups};
 use crate::sentences::capitalised;
-use crate::tables::first_to_fail;
 
 /// Half the width of the drawing of intervals, in its own units. The largest end of all intervals is drawn there.
 const MARK_REACH: f64 = 50.0;
@@ -22,8 +21,6 @@ const MARK_REACH: f64 = 50.0;
 pub(in crate::report) struct PageHead {
     summary: String,
     chart: Option<Figure>,
-    /// Families and frames that fail first, with a line for each variant.
-    first_to_fail: Vec<String>,
     rows: Vec<FindingRow>,
     strip: Option<Strip>,
 }
@@ -67,7 +64,6 @@ impl PageHead {
         }
         Ok(Some(Self {
             chart: chart(report)?,
-            first_to_fail: first_to_fail(report.findings),
             strip: Strip::new(&report.findings.grid, inputs)?,
             ..Self::without_images(groups)
         }))
@@ -78,7 +74,6 @@ impl PageHead {
         Self {
             summary: with_unbroken_percent(summary),
             chart: None,
-            first_to_fail: Vec::new(),
             rows: Vec::new(),
             strip: None,
         }

@@ -30,10 +30,10 @@ pub(crate) struct ChoiceRow {
     /// Darkest level; `None` if no degraded level was asked.
     darkest: Option<AxisLevel>,
     /// Accuracy at the darkest level minus accuracy at L0, with its test.
-    change: Option<(Estimate, Significance)>,
+    change: Option<(Estimate, Option<Significance>)>,
     threshold: Option<Result<EvThreshold, NoThreshold>>,
     /// Largest gain by an enhancer over raw images: enhancer, level and difference, with its test.
-    gain: Option<(String, AxisLevel, Estimate, Significance)>,
+    gain: Option<(String, AxisLevel, Estimate, Option<Significance>)>,
     /// Levels at which the model is detected to be worse than a model without images.
     below: Vec<AxisLevel>,
     /// Number of unreadable replies, and of all replies.
@@ -147,17 +147,12 @@ fn row(findings: &Findings<'_>, variant: &Variant, model: &str, run: &RunLink) -
         clean,
         area: curve.and_then(|curve| curve.summary.area),
         darkest,
-        change: change.map(|change| (change.strict.paired.difference, change.strict.significance)),
+        change: change.map(|change| (change.strict.paired.difference, change.verdict())),
         threshold: curve.map(|curve| curve.summary.threshold),
         gain: gain.and_then(|gain| {
             let enhancer = gain.first.enhancer.as_ref()?.to_string();
             let difference = gain.strict.paired.difference;
-            Some((
-                enhancer,
-                gain.first.level?,
-                difference,
-                gain.strict.significance,
-            ))
+            Some((enhancer, gain.first.level?, difference, gain.verdict()))
         }),
         below: below.filter_map(|subject| subject.level).collect(),
         unread: health.fold([0, 0], |[unread, all], health| {
@@ -188,7 +183,7 @@ pub(super) fn table(number: usize, digests: &GroupDigests, rows: &[ChoiceRow]) -
         )
         .column(Text, "csv change_shown", |row| {
             row.change
-                .map(|(_, verdict)| verdict.is_shown().to_string())
+                .map(|(_, verdict)| verdict.is_some_and(Significance::is_shown).to_string())
         })
         .column(
             Threshold,
@@ -206,7 +201,7 @@ pub(super) fn table(number: usize, digests: &GroupDigests, rows: &[ChoiceRow]) -
         })
         .column(Text, "csv gain_shown", |row| {
             let gain = row.gain.as_ref();
-            gain.map(|(.., verdict)| verdict.is_shown().to_string())
+            gain.map(|(.., verdict)| verdict.is_some_and(Significance::is_shown).to_string())
         })
         .column(Text, "csv below_blind", |row| row.below_text(";"))
         .column(Count, "csv unread", |row| row.unread[0])
@@ -310,14 +305,15 @@ fn board_row(row: &ChoiceRow) -> BoardRow {
 }
 
 /// Cell with a difference in points, its interval, and its condition. A difference that was not detected is marked.
-fn difference(difference: Estimate, verdict: Significance, condition: &str) -> BoardCell {
+fn difference(difference: Estimate, verdict: Option<Significance>, condition: &str) -> BoardCell {
     let ends = format!("[{}, {}]", points(difference.low), points(difference.high));
     let cell = BoardCell::text(&points(difference.value))
         .with_key(difference.value.to_string())
         .with_line(&ends);
     match verdict {
-        Significance::Better => cell.with_line(condition).with_class("better"),
-        Significance::Worse => cell.with_line(condition).with_class("worse"),
+        Some(Significance::Better) => cell.with_line(condition).with_class("better"),
+        Some(Significance::Worse) => cell.with_line(condition).with_class("worse"),
+        None => cell.with_line(condition).with_class("unshown"),
         _ => cell
             .with_line(&format!("{condition}, not shown"))
             .with_class("unshown"),

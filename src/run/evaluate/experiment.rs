@@ -96,7 +96,7 @@ impl Experiment for ChoiceSetup<'_> {
             .iter()
             .filter(|model| model.view == View::Image && !is_reference(&model.name));
         let asked = run_contents(&self.conditions, models.count());
-        power_forecast(&self.dataset, &self.questions, asked)
+        power_forecast(&self.dataset, &self.questions, &self.digests, asked)
     }
 
     fn identity(&self) -> Identity {

@@ -1,18 +1,20 @@
 //! The effect that a planned evaluation can detect: [`power_forecast`].
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashMap};
 
 use crate::dataset::Dataset;
 use crate::report::power::PowerForecast;
 use crate::types::degradations::Kind;
-use crate::types::{Condition, Question, Variant};
+use crate::types::{Condition, Digest, FrameId, Question, Variant};
 use darkqa_score::cluster::{Clusters, FrameTies};
 use darkqa_score::tested_sentences::RunContents;
 
-/// The effect that these questions can detect; `None` without questions, or if a true answer is unknown.
+/// The effect that these questions can detect; `None` without questions, or if a true answer is unknown. `digests` are those of the
+/// frames, as far as they are known.
 pub(super) fn power_forecast(
     dataset: &Dataset,
     questions: &[Question],
+    digests: &HashMap<FrameId, Digest>,
     contents: RunContents,
 ) -> Option<PowerForecast> {
     if questions
@@ -21,7 +23,10 @@ pub(super) fn power_forecast(
     {
         return None;
     }
-    let mut ties = FrameTies::default();
+    let mut ties = FrameTies {
+        digests: digests.clone(),
+        ..FrameTies::default()
+    };
     for question in questions {
         let frame = &question.frame;
         let (scene, several) = (dataset.scene(frame), dataset.image_series(frame));

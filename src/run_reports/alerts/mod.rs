@@ -5,6 +5,7 @@ mod confidence;
 mod constraints;
 mod images;
 mod limits;
+mod missing;
 mod models;
 mod noise;
 mod parsing;
@@ -16,20 +17,21 @@ mod servers;
 mod settings;
 mod words;
 
+pub(super) use missing::missing_alerts;
 pub(super) use replies::empty_answer_alerts;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::combine::Combined;
+use super::combine::{Combined, frame_ties};
 use super::enhancers::enhancer_alerts;
 use super::join::{Joined, JoinedRun};
 use crate::runs::over_budget::OverBudget;
 use crate::text::alert::{Alert, AlertKind};
 use crate::types::manifests::Status;
 use crate::types::text::{counted, plural};
-use crate::types::{FrameId, InputSummary, OpenDetail, StoredDetail as _, TrialRef};
+use crate::types::{Digest, FrameId, InputSummary, OpenDetail, StoredDetail as _, TrialRef};
 use darkqa_score::answers::record::Detail;
-use darkqa_score::cluster::{ClusterUnit, MIN_SCENES};
+use darkqa_score::cluster::{ClusterUnit, MIN_CLUSTERS};
 use darkqa_score::comparisons::compares_models;
 use darkqa_score::comparisons::self_agreement::SelfAgreement;
 use darkqa_score::findings::Findings;
@@ -41,6 +43,10 @@ use darkqa_score::suggested_scenes::SuggestedScenes;
 pub(super) fn alerts(combined: &Combined, findings: &Findings<'_>) -> Vec<Alert> {
     let mut alerts = run_alerts(combined);
     alerts.extend(joining_alerts(combined));
+    alerts.extend(missing_alerts(
+        &missing::counts(&findings.health),
+        "Replies",
+    ));
     alerts.extend(replies::reply_alerts(&findings.health, "count as wrong"));
     alerts.extend(unread_early_ends(combined, "count as wrong"));
     alerts.extend(replies::empty_choice_alerts(combined));
@@ -59,6 +65,7 @@ pub(super) fn alerts(combined: &Combined, findings: &Findings<'_>) -> Vec<Alert>
     ));
     alerts.extend(questions::repeat_alert(combined));
     alerts.extend(questions::item_alerts(findings));
+    alerts.extend(questions::balance_alert(findings));
     alerts.extend(cluster_alerts(
         combined,
         findings.grid.clusters,
@@ -84,6 +91,10 @@ pub(super) fn alerts_without_truths(
 ) -> Vec<Alert> {
     let mut alerts = run_alerts(combined);
     alerts.extend(joining_alerts(combined));
+    alerts.extend(missing_alerts(
+        &missing::counts(&agreement.health),
+        "Replies",
+    ));
     alerts.extend(replies::reply_alerts(&agreement.health, "do not agree"));
     alerts.extend(unread_early_ends(combined, "do not agree"));
     alerts.extend(replies::empty_choice_alerts(combined));
@@ -134,15 +145,15 @@ fn dark_photographs_alert(set: PhotographedSet) -> Option<Alert> {
     set.notice().map(|text| Alert::new(AlertKind::Pairs, text))
 }
 
-/// Alerts about too few clusters for reliable intervals, about a single frame, and about missing scenes. Without replies, the number of
-/// clusters is 0 and gets no alert.
+/// Alerts about few clusters, copies of a picture, a single frame or scene, and missing scenes. Without replies, the number of clusters is
+/// 0 and gets no alert.
 fn cluster_alerts(combined: &Combined, clusters: usize, unit: ClusterUnit) -> Vec<Alert> {
     let frames: BTreeSet<&FrameId> = combined.questions.iter().map(|one| &one.frame).collect();
     let few_clusters = if clusters == 0 {
         None
-    } else if clusters < MIN_SCENES {
+    } else if clusters < MIN_CLUSTERS {
         Some(format!(
-            "Only {} ({MIN_SCENES} are needed): intervals and tests are rough.",
+            "Only {} ({MIN_CLUSTERS} are needed): wide intervals, few possible verdicts.",
             counted(clusters, &unit.to_string())
         ))
     } else if frames.len() == 1 {
@@ -153,36 +164,59 @@ fn cluster_alerts(combined: &Combined, clusters: usize, unit: ClusterUnit) -> Ve
     };
     few_clusters
         .into_iter()
-        .chain(missing_scenes(combined, &frames))
+        .chain(copies(combined, &frames))
+        .chain(named_scenes(combined, &frames))
         .map(|text| Alert::new(AlertKind::Clusters, text))
         .collect()
 }
 
-/// Sentence about missing scenes: if no question has a scene, but the frame names suggest some; or if only some frames have a scene.
-fn missing_scenes(combined: &Combined, frames: &BTreeSet<&FrameId>) -> Option<String> {
-    let in_scenes: BTreeSet<&FrameId> = combined
+/// Sentence about frames that show the same picture; `None` if all pictures differ. A frame without a known digest counts as a picture.
+fn copies(combined: &Combined, frames: &BTreeSet<&FrameId>) -> Option<String> {
+    let digests = frame_ties(&combined.questions).digests;
+    let pictures: BTreeSet<&Digest> = digests.values().collect();
+    let pictures = pictures.len() + frames.len() - digests.len();
+    (pictures < frames.len()).then(|| {
+        format!(
+            "{} show {}: equal pictures count as one frame.",
+            counted(frames.len(), "frame"),
+            counted(pictures, "different picture")
+        )
+    })
+}
+
+/// Sentence about scenes: if no question has one, but the frame names suggest some; if only some frames have one; or if all frames have the
+/// same one.
+fn named_scenes(combined: &Combined, frames: &BTreeSet<&FrameId>) -> Option<String> {
+    let scenes: BTreeMap<&FrameId, &String> = combined
         .questions
         .iter()
         .filter(|one| !one.scene.is_empty())
-        .map(|one| &one.frame)
+        .map(|one| (&one.frame, &one.scene))
         .collect();
-    if in_scenes.is_empty() {
+    if scenes.is_empty() {
         let suggested = SuggestedScenes::new(frames.iter().copied())?;
         return Some(format!(
             "{}: intervals may be too narrow. Give each question a \"scene\" and repeat the run's command; nothing is asked again.",
             suggested.sentence()
         ));
     }
-    let without = frames.len() - in_scenes.len();
-    (without > 0).then(|| {
+    let without = frames.len() - scenes.len();
+    if without > 0 {
         let count = if without == 1 {
             "counts as a scene"
         } else {
             "count as scenes"
         };
-        format!(
+        return Some(format!(
             "{without} of {} have no scene and {count} of their own.",
             counted(frames.len(), "frame")
+        ));
+    }
+    let names: BTreeSet<&String> = scenes.into_values().collect();
+    (names.len() == 1 && frames.len() > 1).then(|| {
+        format!(
+            "All {} frames are of one scene and count as independent: the results are about this scene alone. Take more scenes.",
+            frames.len()
         )
     })
 }

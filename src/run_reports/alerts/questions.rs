@@ -1,4 +1,5 @@
-//! Alerts about questions that differ between runs or models: [`question_alerts`], [`repeat_alert`], [`item_alerts`].
+//! Alerts about questions that differ between runs or models: [`question_alerts`], [`repeat_alert`],
+//! [`item_alerts`]; and about their true answers: [`balance_alert`].
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 
@@ -6,8 +7,9 @@ use crate::run_reports::combine::Combined;
 use crate::run_reports::join::Joined;
 use crate::run_reports::settings::{has_human_answers, joined_with_and};
 use crate::text::alert::{Alert, AlertKind};
-use crate::types::text::counted;
-use crate::types::{QuestionId, RunQuestion, TrialRef};
+use crate::text::words::family as family_name;
+use crate::types::text::{counted, excerpt};
+use crate::types::{QuestionId, RunQuestion, TrialRef, View};
 use darkqa_score::answers::record::Detail;
 use darkqa_score::findings::Findings;
 use darkqa_score::model_in_condition::is_control;
@@ -126,6 +128,39 @@ pub(super) fn repeat_alert(combined: &Combined) -> Option<Alert> {
         );
         Alert::new(AlertKind::Questions, text)
     })
+}
+
+/// The alert about families of which one answer is true so often that a constant reply scores well.
+pub(super) fn balance_alert(findings: &Findings<'_>) -> Option<Alert> {
+    let has_blind = findings
+        .grid
+        .subjects
+        .iter()
+        .any(|subject| subject.view == Some(View::Blind));
+    let remedy = if has_blind {
+        "Compare with the accuracy without images"
+    } else {
+        "Ask without images too (--blind)"
+    };
+    let families: Vec<String> = findings
+        .summary
+        .unbalanced
+        .iter()
+        .map(|one| {
+            format!(
+                "“{}” is true of {} of {} questions about {}",
+                excerpt(&one.answer, 60),
+                one.count,
+                one.questions,
+                family_name(Some(&one.family))
+            )
+        })
+        .collect();
+    let text = format!(
+        "One answer to everything scores well: {}. {remedy}, and read the balanced accuracy.",
+        families.join(", ")
+    );
+    (!families.is_empty()).then(|| Alert::new(AlertKind::Answers, text))
 }
 
 /// The alert about models that did not answer the same questions.

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fmt;
 
-use darkqa_ground::types::{FrameId, QuestionId};
+use darkqa_ground::types::{Digest, FrameId, QuestionId};
 
 /// The unit that is treated as independent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -33,15 +33,17 @@ pub struct FrameTies {
     pub scenes: BTreeMap<FrameId, String>,
     /// Images of each frame that consists of several.
     pub images: BTreeMap<FrameId, Vec<FrameId>>,
+    /// Digest of each frame's file, or of all its files, if it is known.
+    pub digests: HashMap<FrameId, Digest>,
 }
 
 /// The cluster of each frame.
 ///
 /// Questions of a frame and frames of a scene are not independent. Intervals that treat them as independent are too
-/// narrow (Miller 2024, "Adding Error Bars to Evals", arXiv:2411.00640, section 2.2). The unit is the scene if there are at least
-/// [`MIN_SCENES`], and some have more than one frame. A frame without a scene then counts as a scene of its own. Otherwise the unit is the
-/// frame, or the question if there is only one frame. Questions with several images belong to one frame if they share an image with each
-/// other, or with a question about that image alone.
+/// narrow (Miller 2024, "Adding Error Bars to Evals", arXiv:2411.00640, section 2.2). Frames are joined if they show the same picture, or if
+/// they consist of several images and share one with each other or with a question about that image alone. The unit is the scene if there
+/// are two scenes or more, and some have more than one of these frames. A frame without a scene then counts as a scene of its own.
+/// Otherwise the unit is the frame, or the question if there is only one frame.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Clusters {
     unit: ClusterUnit,
@@ -52,9 +54,9 @@ pub struct Clusters {
     count: usize,
 }
 
-/// Minimum number of scenes for clustering by scene. With fewer, the spread between scenes is poorly estimated, and frames are the
-/// clusters.
-pub const MIN_SCENES: usize = 8;
+/// Recommended minimum number of clusters. With fewer, intervals are wide, and a comparison at five levels can have no verdict
+/// (5 · 2 / 2⁷ = 0.08).
+pub const MIN_CLUSTERS: usize = 8;
 
 impl Clusters {
     /// Assigns clusters to questions, given with their frames.
@@ -66,24 +68,20 @@ impl Clusters {
             .into_iter()
             .map(|(question, frame)| (frame, question))
             .collect();
-        let frames: BTreeSet<&FrameId> = pairs.iter().map(|(frame, _)| *frame).collect();
-        let scenes: BTreeSet<(Option<&String>, Option<&FrameId>)> = frames
-            .iter()
-            .map(|frame| scene_or_frame(ties, frame))
-            .collect();
-        if scenes.len() >= MIN_SCENES && scenes.len() < frames.len() {
-            let numbers: BTreeMap<_, u32> = scenes.into_iter().zip(0..).collect();
-            return Self {
-                unit: ClusterUnit::Scene,
-                by_frame: frames
-                    .iter()
-                    .map(|frame| ((*frame).clone(), numbers[&scene_or_frame(ties, frame)]))
-                    .collect(),
-                count: numbers.len(),
-                by_question: HashMap::new(),
-            };
+        let mut frames: Vec<&FrameId> = pairs.iter().map(|(frame, _)| *frame).collect();
+        frames.dedup();
+        let (by_frame, count) = number_frames(&frames, ties, |_| None);
+        if !ties.scenes.is_empty() {
+            let (by_scene, scenes) = number_frames(&frames, ties, |frame| ties.scene(frame));
+            if scenes > 1 && scenes < count {
+                return Self {
+                    unit: ClusterUnit::Scene,
+                    by_frame: by_scene,
+                    count: scenes,
+                    by_question: HashMap::new(),
+                };
+            }
         }
-        let (by_frame, count) = number_frames(&frames, &ties.images);
         if count == 1 {
             return Self {
                 unit: ClusterUnit::Question,
@@ -130,10 +128,20 @@ impl Clusters {
     }
 }
 
-/// Numbers the frames, and returns the count of numbers. Frames that share an image, directly or through others, get the same number.
-fn number_frames(
-    frames: &BTreeSet<&FrameId>,
-    images: &BTreeMap<FrameId, Vec<FrameId>>,
+/// Something that joins all frames that have it.
+#[derive(PartialEq, Eq, Hash)]
+enum Tie<'a> {
+    Image(&'a FrameId),
+    Picture(Digest),
+    Scene(&'a str),
+}
+
+/// Numbers the frames in the order of their scenes and names, and returns the count of numbers. Frames that share a tie, directly or
+/// through others, get the same number.
+fn number_frames<'a>(
+    frames: &[&'a FrameId],
+    ties: &'a FrameTies,
+    scene_of: impl Fn(&FrameId) -> Option<&'a str>,
 ) -> (HashMap<FrameId, u32>, usize) {
     /// Returns the root of a frame in the union-find forest, and shortens the path to it.
     fn root(parents: &mut [usize], mut frame: usize) -> usize {
@@ -144,35 +152,40 @@ fn number_frames(
         frame
     }
     let mut parents: Vec<usize> = (0..frames.len()).collect();
-    let mut first_frames = HashMap::<&FrameId, usize>::new();
+    let mut first_frames = HashMap::<Tie<'_>, usize>::new();
     for (index, frame) in frames.iter().enumerate() {
-        let shown = images
+        let images = ties
+            .images
             .get(*frame)
             .map_or(std::slice::from_ref(*frame), Vec::as_slice);
-        for image in shown {
-            let first = *first_frames.entry(image).or_insert(index);
+        let own = images
+            .iter()
+            .map(Tie::Image)
+            .chain(ties.digests.get(*frame).copied().map(Tie::Picture))
+            .chain(scene_of(frame).map(Tie::Scene));
+        for tie in own {
+            let first = *first_frames.entry(tie).or_insert(index);
             let [one, other] = [first, index].map(|frame| root(&mut parents, frame));
             parents[one.max(other)] = one.min(other);
         }
     }
     let mut numbers = HashMap::<usize, u32>::new();
     let mut by_frame = HashMap::with_capacity(frames.len());
-    for (index, frame) in frames.iter().enumerate() {
+    let mut order: Vec<usize> = (0..frames.len()).collect();
+    order.sort_by_key(|index| scene_of(frames[*index]));
+    for index in order {
         let next = numbers.len() as u32;
         let number = *numbers.entry(root(&mut parents, index)).or_insert(next);
-        by_frame.insert((*frame).clone(), number);
+        by_frame.insert(frames[index].clone(), number);
     }
     (by_frame, numbers.len())
 }
 
-/// The scene of a frame, or the frame itself if it has no scene.
-fn scene_or_frame<'a>(
-    ties: &'a FrameTies,
-    frame: &'a FrameId,
-) -> (Option<&'a String>, Option<&'a FrameId>) {
-    match ties.scenes.get(frame).filter(|scene| !scene.is_empty()) {
-        Some(scene) => (Some(scene), None),
-        None => (None, Some(frame)),
+impl FrameTies {
+    /// The scene of a frame; `None` if it has none.
+    fn scene(&self, frame: &FrameId) -> Option<&str> {
+        let scene = self.scenes.get(frame)?;
+        (!scene.is_empty()).then_some(&**scene)
     }
 }
 
@@ -244,6 +257,41 @@ mod tests {
         assert_eq!((apart.count(), apart.unit()), (6, ClusterUnit::Question));
     }
 
+    /// Cluster of each of six frames with one question each, of which 0 and 3 show the same picture.
+    fn with_a_copy(scenes: &[&str]) -> (Clusters, Vec<Option<u32>>) {
+        let frames: Vec<FrameId> = (0..6).map(|i| FrameId(format!("f{i}"))).collect();
+        let ids: Vec<QuestionId> = (0..6).map(|i| QuestionId(format!("q{i}"))).collect();
+        let ties = FrameTies {
+            scenes: frames
+                .iter()
+                .cloned()
+                .zip(scenes.iter().map(|&scene| scene.to_owned()))
+                .collect(),
+            digests: [0, 3]
+                .map(|i| (frames[i].clone(), Digest::from_bytes(b"picture")))
+                .into(),
+            ..FrameTies::default()
+        };
+        let found = Clusters::new(ids.iter().zip(&frames), &ties);
+        let clusters = clusters_of(&found, &frames, &ids);
+        (found, clusters)
+    }
+
+    #[test]
+    fn equal_pictures_are_one_frame() {
+        let (found, clusters) = with_a_copy(&[]);
+        assert_eq!((found.unit(), found.count()), (ClusterUnit::Frame, 5));
+        assert_eq!(clusters[0], clusters[3]);
+    }
+
+    #[test]
+    fn equal_pictures_join_their_scenes() {
+        let (found, clusters) = with_a_copy(&["a", "a", "b", "b", "c", "c"]);
+        assert_eq!((found.unit(), found.count()), (ClusterUnit::Scene, 2));
+        assert_eq!(clusters[1], clusters[2]);
+        assert_ne!(clusters[0], clusters[4]);
+    }
+
     #[test]
     fn a_frame_without_a_scene_is_a_scene_of_its_own() {
         let frames: Vec<FrameId> = (0..30).map(|i| FrameId(format!("f{i:02}"))).collect();
@@ -264,10 +312,12 @@ mod tests {
     }
 
     #[test]
-    fn scenes_go_before_frames_if_there_are_enough() {
+    fn scenes_go_before_frames_if_there_are_two() {
         for (frames, scenes, questions, unit, count) in [
             (20, 10, 60, ClusterUnit::Scene, 10),
-            (20, 4, 60, ClusterUnit::Frame, 20),
+            (20, 4, 60, ClusterUnit::Scene, 4),
+            (20, 2, 60, ClusterUnit::Scene, 2),
+            (20, 1, 60, ClusterUnit::Frame, 20),
             (20, 0, 60, ClusterUnit::Frame, 20),
             (20, 20, 60, ClusterUnit::Frame, 20),
             (20, 0, 20, ClusterUnit::Question, 20),

@@ -10,9 +10,9 @@ use super::calibration::{Calibration, calibrations};
 use super::choice::ParsingMode;
 use super::cluster::{ClusterUnit, Clusters, FrameTies};
 use super::comparisons::{
-    Agreement, BestInTheDark, Comparison, ComparisonKind, FindingByProfile, ModelsLeftOut,
-    PooledFinding, PooledKind, agreements, best_in_the_dark, by_profile, comparisons,
-    light_agreements, lights_between, models_left_out, pool, pooled,
+    Agreement, BestInTheDark, Claim, Comparison, ComparisonKind, FamilyContrast, FindingByProfile,
+    ModelsLeftOut, PooledFinding, PooledKind, agreements, best_in_the_dark, by_profile,
+    comparisons, family_contrasts, light_agreements, lights_between, models_left_out, pool, pooled,
 };
 use super::grid::Grid;
 use super::model_in_condition::{ModelInCondition, is_control, is_observer};
@@ -39,6 +39,8 @@ pub struct Findings<'a> {
     pub pooled: Vec<PooledFinding>,
     /// Differences averaged over the darker levels of a set, and over the lighter ones. Sentences test them before single levels.
     pub averaged: Vec<PooledFinding>,
+    /// In each variant, the two families whose losses are furthest apart.
+    pub contrasts: Vec<FamilyContrast>,
     /// Models that the pooled findings leave out because they answered fewer items than others.
     pub left_out: Vec<ModelsLeftOut>,
     /// Test results of each claim about noise under every noise profile; empty with a single profile.
@@ -186,6 +188,7 @@ impl<'a> Findings<'a> {
             unit: clusters.unit(),
             summary: summarize(&grid, &health, questions.iter().cloned()),
             health,
+            contrasts: family_contrasts(&grid, &pooled),
             pooled,
             averaged,
             left_out: models_left_out(&grid),
@@ -232,6 +235,14 @@ impl<'a> Findings<'a> {
         self
     }
 
+    /// Ranking of the models in the dark, if its leader is detected to be the best in both parsings.
+    #[must_use]
+    pub fn detected_best(&self) -> Option<&BestInTheDark> {
+        let (strict, lenient) = (self.best.as_ref()?, self.lenient_best.as_ref()?);
+        let is_same = strict.leader().model == lenient.leader().model;
+        (strict.is_detected() && lenient.is_detected() && is_same).then_some(strict)
+    }
+
     /// Models that findings about a variant are about, sorted: models with images, without people and without models that answered fewer
     /// items than others in this variant.
     #[must_use]
@@ -249,8 +260,23 @@ impl<'a> Findings<'a> {
         models
     }
 
-    /// Blind models that are significantly more accurate than a subject: the subject's own model, or any model if that one was not asked
-    /// without images. The test is paired, with Holm's correction over the conditions of the two models.
+    /// True if sentences may be about this comparison of a model with a blind model: raw dark images, in one family or, if the pooled
+    /// findings are about several models, over all families.
+    #[must_use]
+    pub fn is_tested_against_blind(&self, comparison: &Comparison) -> bool {
+        let first = &comparison.first;
+        if comparison.kind != ComparisonKind::Blind
+            || first.enhancer.is_some()
+            || first.variant.kind.is_none()
+        {
+            return false;
+        }
+        let models = self.models_of(&first.variant);
+        models.contains(&&*first.model) && (comparison.family.is_some() || models.len() > 1)
+    }
+
+    /// Blind models that are detected to be more accurate than a subject: the subject's own model, or any model if that one was not asked
+    /// without images. The test is paired, and corrected over all tests behind sentences.
     #[must_use]
     pub fn below_blind(&self, subject: &ModelInCondition, family: Option<&Family>) -> Vec<&str> {
         self.comparisons
@@ -259,7 +285,7 @@ impl<'a> Findings<'a> {
                 comparison.kind == ComparisonKind::Blind
                     && comparison.family.as_ref() == family
                     && comparison.first == *subject
-                    && comparison.strict.significance == Significance::Worse
+                    && comparison.claim() == Claim::Detected(Significance::Worse)
             })
             .map(|comparison| &*comparison.second.model)
             .collect()

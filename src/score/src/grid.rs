@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 use super::choice::ParsingMode;
 use super::cluster::Clusters;
-use super::estimate::ClusterCount;
+use super::estimate::{ClusterCount, Estimate};
 use super::model_in_condition::ModelInCondition;
 use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{
@@ -302,6 +302,33 @@ impl<'a> Grid<'a> {
             }
         }
         counts
+    }
+
+    /// Number of failed trials of a subject in each cluster; empty if none failed.
+    #[must_use]
+    pub fn failed(&self, subject: usize, family: Option<&Family>) -> Vec<u32> {
+        let mut failed = Vec::new();
+        for (item, result) in self.family_items(subject, family) {
+            if result == TrialResult::Failed {
+                failed.resize(self.clusters, 0);
+                failed[item.cluster as usize] += 1;
+            }
+        }
+        failed
+    }
+
+    /// Accuracy of a subject. Its interval holds for all values of the missing replies. `None` without a reply.
+    #[must_use]
+    pub fn accuracy(
+        &self,
+        subject: usize,
+        family: Option<&Family>,
+        mode: ParsingMode,
+    ) -> Option<Estimate> {
+        Estimate::with_missing(
+            &self.counts(subject, family, mode),
+            &self.failed(subject, family),
+        )
     }
 
     /// Returns the grid of the items for which `kept` is true; `kept` has one value per item. Cluster indices do not change.

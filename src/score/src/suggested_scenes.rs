@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 
 use regex::Regex;
 
-use super::cluster::MIN_SCENES;
+use super::cluster::MIN_CLUSTERS;
 use darkqa_ground::types::FrameId;
 
 /// Scenes guessed from the names of frames, if the data name no scenes. Only for a warning, never used as clusters.
@@ -49,7 +49,7 @@ impl SuggestedScenes {
             .or_else(|| Self::grouped(&frames, NamedBy::FileName, numbered_place))
             .or_else(|| {
                 Self::grouped(&frames, NamedBy::FileName, before_number)
-                    .filter(|found| found.scenes >= MIN_SCENES)
+                    .filter(|found| found.scenes >= MIN_CLUSTERS)
             })
     }
 

@@ -1,11 +1,11 @@
 //! Multiple-testing correction of the tests behind the sentences of a report: [`Findings::correct_sentences`].
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::answers::confusion::{AgainstClean, Confusion, FalseAnswer};
 use super::calibration::MIN_CONFIDENT_REPLIES;
 use super::choice::ParsingMode;
-use super::cluster::MIN_SCENES;
+use super::cluster::MIN_CLUSTERS;
 use super::comparisons::{BestInTheDark, ComparisonKind, PooledFinding, PooledKind};
 use super::findings::Findings;
 use super::grid::Grid;
@@ -25,8 +25,12 @@ enum Test {
     Comparison(usize),
     /// The leading model in the dark is the best.
     Best,
-    /// The order of two models changes with the level.
-    Crossing,
+    /// The leading model in the dark is above what it reaches without seeing.
+    Sees,
+    /// The leader at the lighter levels and the leader in the dark differ at a level, by its index.
+    Lead(usize),
+    /// One family loses more than another.
+    Families(usize),
     /// Answer collapse.
     Collapse(usize),
     /// Confidence exceeds accuracy.
@@ -90,6 +94,58 @@ impl Findings<'_> {
             }
         }
         self.tests = tree.count();
+        self.correct_comparisons_of_one_model();
+    }
+
+    /// Copies the corrected p-values of the pooled findings about a single model to the comparisons of the same two sides: a sentence about
+    /// one is about the other.
+    fn correct_comparisons_of_one_model(&mut self) {
+        let mut corrected = HashMap::new();
+        for finding in &self.pooled {
+            let [model] = &finding.models[..] else {
+                continue;
+            };
+            let kind = match finding.kind {
+                PooledKind::Darkness => ComparisonKind::Level,
+                PooledKind::Noise => ComparisonKind::Variant,
+                PooledKind::Enhancer => ComparisonKind::Enhancer,
+                PooledKind::Blind if finding.blind_models == [model.clone()] => {
+                    ComparisonKind::Blind
+                }
+                PooledKind::EnhancerPair | PooledKind::Blind | PooledKind::Hallucination(_) => {
+                    continue;
+                }
+            };
+            if finding.family.is_none() {
+                let sides = (
+                    kind,
+                    &**model,
+                    finding.level,
+                    &finding.variant,
+                    &finding.enhancer,
+                );
+                let p = [finding.strict.p_report, finding.lenient.p_report];
+                corrected.insert(sides, p);
+            }
+        }
+        for comparison in &mut self.comparisons {
+            let first = &comparison.first;
+            let Some(level) = first.level else {
+                continue;
+            };
+            let is_own = comparison.second.model == first.model && comparison.family.is_none();
+            let sides = (
+                comparison.kind,
+                &*first.model,
+                level,
+                &first.variant,
+                &first.enhancer,
+            );
+            if let Some([strict, lenient]) = corrected.get(&sides).filter(|_| is_own) {
+                comparison.strict.p_report = *strict;
+                comparison.lenient.p_report = *lenient;
+            }
+        }
     }
 }
 
@@ -101,7 +157,13 @@ fn report_tests(findings: &Findings<'_>) -> Tests {
         .best
         .as_ref()
         .filter(|best| best.is_possible())
-        .map(|_| [Test::Best, Test::Crossing].map(TestTree::leaf));
+        .map(|best| {
+            let levels = 0..best.lighter.len() + best.levels.len();
+            [
+                TestTree::chain([Test::Best, Test::Sees].into_iter()),
+                TestTree::group(levels.map(|level| TestTree::leaf(Test::Lead(level)))),
+            ]
+        });
     let fidelity = findings
         .fidelity
         .as_ref()
@@ -113,6 +175,7 @@ fn report_tests(findings: &Findings<'_>) -> Tests {
         kind_tests(findings, &sets, PooledKind::Hallucination(FalseAnswer::Yes)),
         collapses(findings),
         confidence(findings),
+        families(findings),
         TestTree::group(fidelity.map(|_| TestTree::leaf(Test::Fidelity))),
     ];
     let main = [kind_tests(findings, &sets, PooledKind::Darkness)]
@@ -127,6 +190,13 @@ fn report_tests(findings: &Findings<'_>) -> Tests {
         kind_tests(findings, &sets, PooledKind::Noise).with_weight(NOISE),
         TestTree::group(further).with_weight(FURTHER),
     ]))
+}
+
+/// Tests of the difference between two families, one per main variant.
+fn families(findings: &Findings<'_>) -> Tests {
+    let contrasts = findings.contrasts.iter().enumerate();
+    let main = contrasts.filter(|(_, found)| is_main(&findings.grid, &found.variant));
+    TestTree::group(main.map(|(index, _)| TestTree::leaf(Test::Families(index))))
 }
 
 /// Tests of the sets of one kind.
@@ -161,7 +231,10 @@ struct PooledSet<'f> {
 fn pooled_sets<'f>(findings: &'f Findings<'_>) -> Vec<PooledSet<'f>> {
     let mut sets: Vec<PooledSet<'f>> = Vec::new();
     for (index, finding) in findings.pooled.iter().enumerate() {
-        if finding.family.as_ref() != finding.kind.only_family() {
+        // No sentence is about two enhancers.
+        if finding.family.as_ref() != finding.kind.only_family()
+            || finding.kind == PooledKind::EnhancerPair
+        {
             continue;
         }
         let (kind, variant, enhancer) = (finding.kind, &finding.variant, finding.enhancer.as_ref());
@@ -233,17 +306,14 @@ impl PooledSet<'_> {
     }
 }
 
-/// Comparisons of each family and model with the blind baseline, in order from the darkest level.
+/// Comparisons of each family and model with the blind baseline, in order from the darkest level. If several models are pooled, each is also
+/// compared over all families.
 fn below_blind(findings: &Findings<'_>) -> Tests {
     let mut chains = BTreeMap::<_, Vec<Test>>::new();
     for (index, comparison) in findings.comparisons.iter().enumerate() {
         let (first, second) = (&comparison.first, &comparison.second);
-        if comparison.kind == ComparisonKind::Blind
-            && comparison.family.is_some()
-            && first.enhancer.is_none()
-            && first.variant.kind.is_some()
+        if findings.is_tested_against_blind(comparison)
             && is_main(&findings.grid, &first.variant)
-            && findings.models_of(&first.variant).contains(&&*first.model)
             && comparison.strict.significance.is_possible()
         {
             let key = (
@@ -342,7 +412,7 @@ fn against_clean(confusion: &Confusion) -> Option<&AgainstClean> {
 
 /// Tests of each model's confidence: overconfidence, then its growth since L0.
 fn confidence(findings: &Findings<'_>) -> Tests {
-    if findings.grid.clusters < MIN_SCENES {
+    if findings.grid.clusters < MIN_CLUSTERS {
         return TestTree::group([]);
     }
     let darkest = darkest(findings);
@@ -368,7 +438,11 @@ impl Test {
             Self::Averaged(index) => Some(findings.averaged[index].parsed(mode).p),
             Self::Comparison(index) => Some(findings.comparisons[index].parsed(mode).paired.p),
             Self::Best => best.map(BestInTheDark::p_leader),
-            Self::Crossing => best.and_then(|best| Some(best.crossing.as_ref()?.p)),
+            Self::Sees => best.map(|best| best.gain.p),
+            Self::Lead(level) => {
+                best.and_then(|best| Some(best.crossing.as_ref()?.levels.get(level)?.p))
+            }
+            Self::Families(index) => Some(findings.contrasts[index].parsed(mode).p),
             Self::Collapse(index) => {
                 against_clean(&findings.confusions[index]).map(|clean| clean.p(mode))
             }
@@ -404,11 +478,18 @@ impl Test {
                     best.p_report = p;
                 }
             }
-            Self::Crossing => {
-                if let Some(crossing) = best.and_then(|best| best.crossing.as_mut()) {
-                    crossing.p_report = p;
+            Self::Sees => {
+                if let Some(best) = best {
+                    best.gain.p_report = p;
                 }
             }
+            Self::Lead(level) => {
+                let crossing = best.and_then(|best| best.crossing.as_mut());
+                if let Some(lead) = crossing.and_then(|crossing| crossing.levels.get_mut(level)) {
+                    lead.p_report = p;
+                }
+            }
+            Self::Families(index) => findings.contrasts[index].parsed_mut(mode).p_report = p,
             Self::Collapse(index) => {
                 let found = &mut findings.confusions[index].collapse;
                 if let Some(clean) = found.as_mut().and_then(|found| found.clean.as_mut()) {

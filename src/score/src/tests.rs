@@ -4,7 +4,9 @@ use super::answers::confusion::{Collapse, FalseAnswer, confusions};
 use super::choice::ParsingMode;
 use super::cluster::{Clusters, FrameTies};
 use super::comparisons::paired::PairedComparison;
-use super::comparisons::{PooledFinding, PooledKind, best_in_the_dark, pooled};
+use super::comparisons::{
+    Comparison, ComparisonKind, PooledFinding, PooledKind, best_in_the_dark, pooled,
+};
 use super::findings::Findings;
 use super::grid::Grid;
 use super::model_in_condition::ModelInCondition;
@@ -266,15 +268,133 @@ fn crossing_is_corrected_for_model_pairs() {
     assert!((three - 3.0 * two).abs() < 1e-12, "{two} {three}");
 }
 
-/// The p-value of the change of order from `bright` to `steady`.
+/// The p-value of the difference between `bright` and `steady` at L0.
 fn crossing_p(records: &[Record]) -> f64 {
     with_grid(records, |grid| {
         let best = best_in_the_dark(grid, ParsingMode::Strict).unwrap();
         let crossing = best.crossing.unwrap();
-        assert_eq!(crossing.before.0, "bright");
-        assert_eq!(crossing.after.0, "steady");
-        crossing.p
+        assert_eq!((&*crossing.light, &*crossing.dark), ("bright", "steady"));
+        assert_eq!(crossing.levels.len(), 2);
+        crossing.levels[0].p
     })
+}
+
+#[test]
+fn leader_is_compared_with_its_own_replies_without_images() {
+    let dark = |item: usize| Some(!item.is_multiple_of(4));
+    let mut all = [
+        records("a", "L0", |_| Some(true)),
+        records("a", "L5-noise", dark),
+        records("b", "L0", |_| Some(true)),
+        records("b", "L5-noise", |item| Some(item % 4 == 0)),
+    ]
+    .concat();
+    // Without replies without images, the choices decide what chance is.
+    with_grid(&all, |grid| {
+        let gain = best_in_the_dark(grid, ParsingMode::Strict).unwrap().gain;
+        let choices = grid.items[0].asked.choices.len() as f64;
+        assert!(!gain.is_against_blind);
+        assert!((gain.difference.value - (0.75 - 1.0 / choices)).abs() < 1e-12);
+    });
+    all.extend(records("a", "", dark));
+    with_grid(&all, |grid| {
+        let gain = best_in_the_dark(grid, ParsingMode::Strict).unwrap().gain;
+        assert!(gain.is_against_blind);
+        assert!(
+            gain.difference.value.abs() < 1e-12 && gain.p > 0.99,
+            "{gain:?}"
+        );
+    });
+}
+
+#[test]
+fn families_are_compared_by_a_test() {
+    let contrast = |dark: Answers| {
+        let all = [
+            records("m", "L0", |_| Some(true)),
+            records("m", "L5-noise", dark),
+        ]
+        .concat();
+        let trials = all.iter().cloned().collect();
+        let findings = Findings::new(&trials, &FrameTies::default(), [], &[]);
+        findings.contrasts[0].clone()
+    };
+    // The questions of a frame are of two families, of which only one is lost.
+    let one = contrast(|item| Some(item % 2 == 0));
+    assert_eq!(one.pairs, 1);
+    assert!((one.strict.difference.value + 1.0).abs() < 1e-12, "{one:?}");
+    assert!(one.is_detected() && one.most != one.least, "{one:?}");
+    let both = contrast(|item| Some(item % 8 < 2));
+    assert!(both.strict.difference.value.abs() < 1e-12, "{both:?}");
+    assert!(both.strict.p > 0.5 && !both.is_detected(), "{both:?}");
+}
+
+#[test]
+fn rows_of_one_model_have_the_verdict_of_the_sentences() {
+    let one = [
+        records("m", "L0", |_| Some(true)),
+        records("m", "L5-noise", |_| Some(false)),
+    ]
+    .concat();
+    let two = [
+        one.clone(),
+        records("n", "L0", |_| Some(true)),
+        records("n", "L5-noise", |_| Some(false)),
+    ]
+    .concat();
+    let verdicts = |all: &[Record]| {
+        let trials = all.iter().cloned().collect();
+        let findings = Findings::new(&trials, &FrameTies::default(), [], &[]);
+        let level = findings
+            .comparisons
+            .iter()
+            .find(|one| one.kind == ComparisonKind::Level && one.family.is_none());
+        let pooled = &find(&findings.pooled, PooledKind::Darkness, "L5-noise")[0];
+        (level.unwrap().verdict(), pooled.verdict())
+    };
+    let worse = Some(Significance::Worse);
+    assert_eq!(verdicts(&one), (worse, worse));
+    // With two models, the sentences are about their mean.
+    assert_eq!(verdicts(&two), (None, worse));
+}
+
+#[test]
+fn enhancers_are_compared_with_each_other() {
+    let all = [
+        records("m", "L5-noise", |item| Some(item % 2 == 0)),
+        records("m", "L5-noise+a", |_| Some(true)),
+        records("m", "L5-noise+b", |item| Some(item % 3 != 0)),
+        records("m", "L5-noise+c", |_| Some(false)),
+    ]
+    .concat();
+    let trials = all.iter().cloned().collect();
+    let findings = Findings::new(&trials, &FrameTies::default(), [], &[]);
+    let names = |finding: &PooledFinding| {
+        let against = finding.against.as_ref().unwrap().as_str();
+        format!("{}-{against}", finding.enhancer.as_ref().unwrap())
+    };
+    let pooled: Vec<&PooledFinding> = findings
+        .pooled
+        .iter()
+        .filter(|finding| finding.kind == PooledKind::EnhancerPair && finding.family.is_none())
+        .collect();
+    let pairs: Vec<String> = pooled.iter().map(|finding| names(finding)).collect();
+    assert_eq!(pairs, ["a-b", "a-c", "b-c"]);
+    assert!((pooled[1].strict.difference.value - 1.0).abs() < 1e-12);
+    // Holm's correction is over the three pairs, and no sentence is about them.
+    assert!((pooled[1].strict.holm - 3.0 * pooled[1].strict.p).abs() < 1e-12);
+    assert!(
+        pooled
+            .iter()
+            .all(|finding| finding.strict.p_report.is_none())
+    );
+    let single: Vec<&Comparison> = findings
+        .comparisons
+        .iter()
+        .filter(|one| one.kind == ComparisonKind::EnhancerPair && one.family.is_none())
+        .collect();
+    assert_eq!(single.len(), 3);
+    assert!(single.iter().all(|one| one.verdict().is_none()));
 }
 
 #[test]

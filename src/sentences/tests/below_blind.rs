@@ -54,6 +54,8 @@ fn tested(difference: f64, significance: Significance) -> TestedComparison {
             clusters: 24,
             mcnemar: 0.02,
             p: 0.001,
+            p_if_answered: 0.001,
+            missing: 0,
             spread: Spread {
                 error: 0.05,
                 degrees: 23.0,

@@ -38,14 +38,22 @@ fn best_model_is_chosen_at_dark_levels() {
     let two = [bright.clone(), steady.clone()].concat();
     let best = of_kind(&sentences_about(&two), "best");
     assert!(
-        best[0].starts_with("· bright is better to L2, steady from L3. (steady over L3–L5: "),
+        best[0].starts_with("· bright is better at L0–L2, steady at L3–L5. (steady over L3–L5: "),
         "{best:?}"
     );
     // A third model that is worse everywhere changes nothing.
     let third = scripted("third", &at_noise_levels([40, 40, 40, 34, 30, 28]));
     let best = of_kind(&sentences_about(&[two, third].concat()), "best");
     assert!(
-        best[0].starts_with("· bright is better to L2, steady from L3. ("),
+        best[0].starts_with("· bright is better at L0–L2, steady at L3–L5. ("),
+        "{best:?}"
+    );
+    // Levels without a detected difference are not attributed to a model.
+    let bright = scripted("bright", &at_noise_levels([99, 61, 60, 60, 60, 10]));
+    let even = scripted("even", &at_noise_levels([50, 60, 60, 60, 60, 70]));
+    let best = of_kind(&sentences_about(&[bright, even].concat()), "best");
+    assert!(
+        best[0].starts_with("· bright is better at L0, even at L5; not told apart at L1–L4. ("),
         "{best:?}"
     );
     // Without a change of order the best at L3 to L5 is named, not the best of all levels.
@@ -70,10 +78,30 @@ fn change_of_leader_is_detected_in_both_parsings() {
         "best",
     );
     assert!(
-        best[0].starts_with("· bright is better to L2, steady from L3. ("),
+        best[0].starts_with("· bright is better at L0–L2, steady at L3–L5. ("),
         "{best:?}"
     );
     assert!(!best[0].contains("strict parsing alone"), "{best:?}");
+}
+
+#[test]
+fn model_that_answers_as_without_images_does_not_see() {
+    let mut levels = vec![("blind", 60)];
+    levels.extend(at_noise_levels([90, 60, 60, 60, 60, 60]));
+    let blind = scripted("blind", &levels);
+    let worse = scripted("worse", &at_noise_levels([90, 30, 30, 10, 10, 10]));
+    let best = of_kind(&sentences_about(&[blind, worse].concat()), "best");
+    assert!(
+        best[0].starts_with(
+            "· blind has the highest mean accuracy in the dark (L3–L5), but was not detected to be above its own replies without images. ("
+        ),
+        "{best:?}"
+    );
+    assert!(
+        best[0].contains("; 0.0 [")
+            && best[0].contains("] against its own replies without images, p = 1.000;"),
+        "{best:?}"
+    );
 }
 
 /// L0 to L5 with noise, each with a percentage of right replies.

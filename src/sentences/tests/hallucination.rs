@@ -96,6 +96,8 @@ fn at_clean(share: f64) -> PairedComparison {
         clusters: 24,
         mcnemar: 0.001,
         p: 0.001,
+        p_if_answered: 0.001,
+        missing: 0,
         spread: Spread {
             error: 0.05,
             degrees: 23.0,

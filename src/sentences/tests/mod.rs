@@ -2,8 +2,10 @@
 
 mod below_blind;
 mod best;
+mod claims;
 mod confidence;
 mod hallucination;
+mod missing;
 mod real;
 mod records;
 mod simulation;
@@ -37,6 +39,7 @@ fn finding(
             ..Variant::NONE
         },
         enhancer,
+        against: None,
         level: AxisLevel::new(Kind::Sensor, Severity::LADDER[level - 1]),
         mean_over: Vec::new(),
         models: ["a", "b"].map(str::to_owned).to_vec(),
@@ -51,6 +54,7 @@ fn finding(
         levels: 5,
         items: 1237,
         dropped: 0,
+        missing: 0,
         clusters: 30,
         least_p: 1e-9,
         least_holm: 1e-8,
@@ -76,6 +80,7 @@ fn parsed(kind: PooledKind, difference: f64, verdict: Significance) -> PooledDif
             n: 1237,
         },
         p: 0.0124,
+        p_if_answered: 0.0124,
         p_by: SwapMethod::Counted,
         holm,
         verdict,
@@ -129,7 +134,7 @@ fn each_kind_and_verdict_has_a_sentence() {
         said,
         [
             "− Darkness costs 44.9 points at L3, from 86.4 % at L0. (mean of these 2 models: −44.9 [−48.9, −40.9], p < 0.001; a loss is \
-          shown at L2–L3; n = 1,237 in 30 scenes)"
+          shown at L2–L3; at L1–L3: −2.0, −10.0, −44.9; n = 1,237 in 30 scenes)"
         ]
     );
     let said = level_sentences(Darkness, &[(-0.02, NotShown), (-0.01, NotShown)]);
@@ -209,13 +214,13 @@ fn level_sentences(kind: PooledKind, levels: &[(f64, Significance)]) -> Vec<Stri
     let all: Vec<&PooledFinding> = all.iter().collect();
     let unit = ClusterUnit::Scene;
     let sentences: Vec<Sentence> = match kind {
-        PooledKind::Darkness => darkness::with_variant(&all, None, None, unit)
+        PooledKind::Darkness => darkness::with_variant(&all, None, &[], None, unit)
             .into_iter()
             .collect(),
         PooledKind::Noise => pooled::noise(&all, &[], unit),
         PooledKind::Enhancer => pooled::enhancers(&all, &[], unit),
         PooledKind::Blind => below::pooled(&all, unit).into_iter().collect(),
-        PooledKind::Hallucination(_) => Vec::new(),
+        PooledKind::EnhancerPair | PooledKind::Hallucination(_) => Vec::new(),
     };
     sentences.iter().map(checked).collect()
 }
@@ -225,7 +230,7 @@ fn undetected_effects_may_be_unconfirmed() {
     let unit = ClusterUnit::Scene;
     let all = findings(PooledKind::Darkness, &[(-0.05, NotShown)]);
     let all: Vec<&PooledFinding> = all.iter().collect();
-    let said = checked(&darkness::with_variant(&all, None, None, unit).unwrap());
+    let said = checked(&darkness::with_variant(&all, None, &[], None, unit).unwrap());
     assert!(
         said.starts_with(
             "· At L1 accuracy is 5.0 points lower than at L0, unconfirmed after correction for all tests. ("
@@ -310,7 +315,7 @@ fn means_are_reported_without_a_detected_level() {
     assert!(
         helps[0].starts_with(
             "+ lift helps at L4–L5, by 5.0 points on average. (mean of these 2 models: +5.0 ["
-        ) && helps[0].contains("; mean of L4–L5; n = "),
+        ) && helps[0].contains("; mean of L4–L5; at L1–L5: +1.0, +1.0, +1.0, +1.0, +1.0; n = "),
         "{helps:?}"
     );
     assert!(
@@ -342,7 +347,7 @@ fn mean_sentences(kind: PooledKind, difference: f64, verdict: Significance) -> V
     let [levels, means] = [&levels, &means].map(|all| all.iter().collect::<Vec<&PooledFinding>>());
     let unit = ClusterUnit::Scene;
     let sentences: Vec<Sentence> = match kind {
-        PooledKind::Darkness => darkness::with_variant(&levels, Some(means[0]), None, unit)
+        PooledKind::Darkness => darkness::with_variant(&levels, Some(means[0]), &[], None, unit)
             .into_iter()
             .collect(),
         PooledKind::Noise => pooled::noise(&levels, &means, unit),
@@ -412,7 +417,8 @@ fn one_model_and_lost_items_are_named() {
     let mut one = finding(PooledKind::Darkness, 5, -0.3, Worse);
     one.models = vec!["gpt-4o".to_owned()];
     (one.dropped, one.strict.p_by, one.clusters) = (100, SwapMethod::Drawn(100_000), 1);
-    let said = checked(&darkness::with_variant(&[&one], None, None, ClusterUnit::Frame).unwrap());
+    let said =
+        checked(&darkness::with_variant(&[&one], None, &[], None, ClusterUnit::Frame).unwrap());
     assert!(
         said.ends_with(
             "(gpt-4o: −30.0 [−34.0, −26.0], p < 0.001; a loss is shown at L5; n = 1,237 in 1 frame, 100 left out because a model has no \

@@ -455,9 +455,8 @@ fn two_families_are_compared() {
         "{families:?}"
     );
     assert!(
-        families[0].ends_with(
-            "the two intervals do not meet, which is no test; p < 0.001 is that of the loss in object colour)"
-        ),
+        families[0]
+            .ends_with("difference −100.0 [−117.2, −54.3], p < 0.001; the only pair of families)"),
         "{families:?}"
     );
 }

@@ -147,14 +147,14 @@ impl Design {
 }
 
 /// Normal random numbers with mean 0 and this standard deviation.
-fn normals(random: &mut StdRng, count: usize, deviation: f64) -> Vec<f64> {
+pub(super) fn normals(random: &mut StdRng, count: usize, deviation: f64) -> Vec<f64> {
     (0..count)
         .map(|_| deviation * Distribution::<f64>::sample(&StandardNormal, random))
         .collect()
 }
 
 /// Sets an answer that is right with probability `p`, by a draw between 0 and 1.
-fn set_answer(detail: &mut ChoiceDetail, p: f64, drawn: f64) {
+pub(super) fn set_answer(detail: &mut ChoiceDetail, p: f64, drawn: f64) {
     let choices = detail.choices.len();
     let is_right = drawn < p;
     let chosen = if is_right {
@@ -187,9 +187,11 @@ fn set_answer(detail: &mut ChoiceDetail, p: f64, drawn: f64) {
     });
 }
 
-/// True if a sentence claims an effect.
+/// True if a sentence claims an effect: by its sign, or in words.
 fn is_claim(sentence: &Sentence) -> bool {
-    matches!(sentence.tone, Tone::Better | Tone::Worse) || sentence.kind == "collapse"
+    matches!(sentence.tone, Tone::Better | Tone::Worse)
+        || ["collapse", "families"].contains(&sentence.kind)
+        || sentence.kind == "best" && sentence.tone == Tone::Note
 }
 
 /// Outcomes of the runs of a design.
@@ -270,13 +272,13 @@ fn simulate(design: &Design, runs: usize, seed: u64) -> Counts {
 }
 
 /// A share in percent with Wilson's interval.
-fn percent(count: usize, runs: usize) -> String {
+pub(super) fn percent(count: usize, runs: usize) -> String {
     let share = darkqa_score::estimate::Estimate::share(count, runs).unwrap();
     let [value, low, high] = [share.value, share.low, share.high].map(|x| 100.0 * x);
     format!("{value:.1} [{low:.1}, {high:.1}]")
 }
 
-fn runs() -> usize {
+pub(super) fn runs() -> usize {
     std::env::var("DARKQA_RUNS")
         .ok()
         .and_then(|runs| runs.parse().ok())

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::quantiles::{degrees_of_freedom, least_share, student};
-use super::residuals::{residuals, unknown_design_effect};
+use super::residuals::{residuals, unknown_design_effect, variance_of_few};
 
 /// Counts of the replies in a cluster.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -12,6 +12,24 @@ pub struct ClusterCount {
     pub right: u32,
     /// Number of replies, right or wrong.
     pub replies: u32,
+}
+
+/// The counts with the missing replies of each cluster filled in, all of them right or all wrong. `missing` may be empty.
+#[must_use]
+pub fn fill_missing(
+    counts: &[ClusterCount],
+    missing: &[u32],
+    are_right: bool,
+) -> Vec<ClusterCount> {
+    let missing = missing.iter().copied().chain(std::iter::repeat(0));
+    counts
+        .iter()
+        .zip(missing)
+        .map(|(count, missing)| ClusterCount {
+            right: count.right + if are_right { missing } else { 0 },
+            replies: count.replies + missing,
+        })
+        .collect()
 }
 
 /// The 97.5 % quantile of the standard normal distribution, for 95 % intervals.
@@ -57,9 +75,9 @@ impl Estimate {
     /// The share of right replies in clusters; `None` without replies.
     ///
     /// The interval is Wilson's at the effective number of replies n / d. The design effect d ≥ 1 is the variance of the share between
-    /// clusters, which is the sum of their squared [`residuals`], over that of independent replies. Student's quantile replaces the
-    /// normal one. Dean and Pagano 2015 (J. Surv. Stat. Methodol. 3:484) find this interval the best of seven for clustered shares. With
-    /// one reply per cluster it is Wilson's own. If all replies are right, or none, d is [`unknown_design_effect`].
+    /// clusters, which is the sum of their squared [`residuals`] ([`variance_of_few`] for few clusters), over that of independent replies.
+    /// Student's quantile replaces the normal one. Dean and Pagano 2015 (J. Surv. Stat. Methodol. 3:484) find this interval the best of seven
+    /// for clustered shares. With one reply per cluster it is Wilson's own. If all replies are right, or none, d is [`unknown_design_effect`].
     ///
     /// The degrees of freedom follow from the clusters' residuals ([`degrees_of_freedom`]). The shares of wholly right and wholly wrong
     /// clusters bound the interval ([`Self::bounded_by_whole_clusters`]).
@@ -74,6 +92,19 @@ impl Estimate {
             .map(|count| (f64::from(count.right), f64::from(count.replies)))
             .collect();
         Self::from_scores(&sums, 1.0, n)
+    }
+
+    /// The share of right replies, with an interval that holds whatever the missing replies of each cluster would have been: it covers the
+    /// interval of the share with all of them wrong, and the one with all of them right. `None` without replies.
+    #[must_use]
+    pub fn with_missing(counts: &[ClusterCount], missing: &[u32]) -> Option<Self> {
+        let estimate = Self::clustered(counts)?;
+        if missing.iter().all(|missing| *missing == 0) {
+            return Some(estimate);
+        }
+        let bounds = [false, true]
+            .map(|are_right| Self::clustered(&fill_missing(counts, missing, are_right)));
+        Some(estimate.covering(bounds.into_iter().flatten()))
     }
 
     /// The mean of scores between 0 and 1 in clusters, with the interval of [`Self::clustered`].
@@ -92,7 +123,8 @@ impl Estimate {
         let has_spread = binomial_variance > 1e-12 && residuals.len() > 1;
         let design_effect = if has_spread {
             let between: f64 = residuals.iter().map(|residual| residual * residual).sum();
-            between / (all * all) / binomial_variance
+            let independent = binomial_variance * all * all;
+            variance_of_few(sums, between, independent, max_weight) / independent
         } else {
             unknown_design_effect(sums)
         };
@@ -150,6 +182,16 @@ impl Estimate {
             high: (center + half).clamp(value, 1.0),
             n,
         }
+    }
+
+    /// The estimate with its interval widened to cover those of `others`.
+    #[must_use]
+    pub fn covering(self, others: impl IntoIterator<Item = Self>) -> Self {
+        others.into_iter().fold(self, |covering, other| Self {
+            low: covering.low.min(other.low),
+            high: covering.high.max(other.high),
+            ..covering
+        })
     }
 
     /// A value with this interval, widened to contain the value.
@@ -232,6 +274,9 @@ mod tests {
         let small = [5, 4, 5, 3, 5, 5, 4, 2, 5, 4, 5, 5, 3, 5, 4, 5].map(|right| (right, 5));
         let third = [&[(14, 40)], &small[..]].concat();
         let even = [5, 6, 4, 5, 5, 6, 4, 5].map(|right| (right, 10));
+        let six = [12, 14, 10, 16, 11, 13].map(|right| (right, 20));
+        let small = [3, 2, 4, 1, 3, 2, 4, 4, 3, 2].map(|right| (right, 4));
+        let most = [&[(60, 90)], &small[..]].concat();
         for (pairs, low, high) in [
             // Without the bound by whole clusters, the lower end would be 73.1 %.
             (&one_bad[..], 0.897_446_455_347_9, 0.999_177_030_322_5),
@@ -239,6 +284,9 @@ mod tests {
             (&unequal, 0.475_837_910_733_2, 0.858_599_144_512_9),
             (&third[..], 0.175_134_913_598_4, 0.959_515_474_172_5),
             (&even, 0.392_974_150_861_2, 0.607_025_849_138_8),
+            // Few clusters, and one with most replies: an assumed correlation widens both.
+            (&six, 0.470_828_099_851_5, 0.770_282_614_722_5),
+            (&most[..], 0.522_580_047_732_3, 0.800_424_999_111_3),
         ] {
             let share = Estimate::clustered(&counts(pairs)).unwrap();
             assert!((share.low - low).abs() < 1e-9, "{pairs:?}: {share:?}");

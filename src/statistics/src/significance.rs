@@ -21,16 +21,42 @@ pub enum Significance {
     TooFewClusters,
     /// Fewer items are shared than a verdict needs (`MIN_PAIRS` of the comparison).
     TooFew,
+    /// The missing replies decide: with some values of them a difference would be detected, with others not.
+    Missing,
+}
+
+/// Corrected p-values behind a verdict.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CorrectedP {
+    /// p-value that holds whatever the missing replies would have been.
+    pub p: f64,
+    /// Smallest p-value that any values of the missing replies could give; `p` if no reply is missing.
+    pub if_answered: f64,
+    /// Smallest p-value that the clusters allow.
+    pub least: f64,
+}
+
+impl CorrectedP {
+    /// p-values of a test without missing replies.
+    #[must_use]
+    pub fn complete(p: f64, least: f64) -> Self {
+        Self {
+            p,
+            if_answered: p,
+            least,
+        }
+    }
 }
 
 impl Significance {
-    /// The result for a difference with the corrected p-value `holm`; `least_holm` is the smallest corrected p-value that the clusters
-    /// allow.
+    /// The result for a difference with these p-values.
     #[must_use]
-    pub fn new(difference: f64, holm: f64, least_holm: f64) -> Self {
-        if least_holm >= ALPHA {
+    pub fn new(difference: f64, corrected: CorrectedP) -> Self {
+        if corrected.least >= ALPHA {
             Self::TooFewClusters
-        } else if holm >= ALPHA {
+        } else if corrected.p >= ALPHA && corrected.if_answered < ALPHA {
+            Self::Missing
+        } else if corrected.p >= ALPHA {
             Self::NotShown
         } else if difference > 0.0 {
             Self::Better
@@ -45,10 +71,16 @@ impl Significance {
         matches!(self, Self::Better | Self::Worse)
     }
 
-    /// True if a verdict is possible.
+    /// True if a verdict is possible, whatever the replies.
     #[must_use]
     pub fn is_possible(self) -> bool {
         !matches!(self, Self::TooFew | Self::TooFewClusters)
+    }
+
+    /// True if there is a verdict: enough clusters and items, and no missing replies that decide it.
+    #[must_use]
+    pub fn is_decided(self) -> bool {
+        self.is_possible() && self != Self::Missing
     }
 
     /// The word for the result in tables; empty if no verdict is possible.
@@ -60,6 +92,7 @@ impl Significance {
             Self::NotShown => "not shown",
             Self::TooFewClusters => "",
             Self::TooFew => "too few",
+            Self::Missing => "replies missing",
         }
     }
 }
@@ -421,9 +454,21 @@ mod tests {
         assert!((least_p(0) - 1.0).abs() < 1e-15);
         for (clusters, expected) in [(8, Significance::Worse), (7, Significance::TooFewClusters)] {
             let least = 5.0 * least_p(clusters);
-            assert_eq!(Significance::new(-0.3, least, least), expected);
+            assert_eq!(
+                Significance::new(-0.3, CorrectedP::complete(least, least)),
+                expected
+            );
         }
-        assert_eq!(Significance::new(0.3, 0.05, 0.01), Significance::NotShown);
+        assert_eq!(
+            Significance::new(0.3, CorrectedP::complete(0.05, 0.01)),
+            Significance::NotShown
+        );
+        let undecided = CorrectedP {
+            p: 0.2,
+            if_answered: 0.04,
+            least: 0.01,
+        };
+        assert_eq!(Significance::new(0.3, undecided), Significance::Missing);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Threshold and area of one accuracy curve, from counts by level and cluster: [`LevelCounts`], [`CurveSummary`].
 
 use super::bootstrap::Resamples;
-use super::estimate::{ClusterCount, Estimate};
+use super::estimate::{ClusterCount, Estimate, fill_missing};
 use super::trapezoid::weights;
 use darkqa_ground::types::AxisLevel;
 
@@ -12,7 +12,7 @@ const MIN_CLUSTERS: usize = 8;
 /// Minimum number of replies of a level as a share of those at L0 (chosen).
 const MIN_SHARE: f64 = 0.1;
 
-/// Exposure drop, in EV, at which a model's accuracy is half-way between that at L0 and chance, with a 95 % interval.
+/// Exposure drop, in EV, at which a model's accuracy is half-way between that at L0 and the floor, with a 95 % interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Threshold {
     /// The threshold; infinite if accuracy at the darkest level is still above half-way.
@@ -21,6 +21,28 @@ pub struct Threshold {
     pub low: f64,
     /// Upper end of the interval; infinite if beyond the darkest level.
     pub high: f64,
+}
+
+impl Threshold {
+    /// The threshold with an interval that covers those of both bounds of the missing replies, the earliest first.
+    ///
+    /// # Errors
+    /// If accuracy falls below half-way only with some values of the missing replies, or may do so.
+    fn bounded(self, bounds: &[Result<Self, NoThreshold>; 2]) -> Result<Self, NoThreshold> {
+        let [earliest, latest] = bounds;
+        // Without a threshold, accuracy at L0 may not be above chance.
+        let low = earliest.map_or(0.0, |bound| bound.low).min(self.low);
+        if self.value.is_infinite() && low.is_finite() {
+            return Err(NoThreshold::Missing { low });
+        }
+        Ok(Self {
+            low,
+            high: latest
+                .map_or(f64::INFINITY, |bound| bound.high)
+                .max(self.high),
+            ..self
+        })
+    }
 }
 
 /// A level with too few replies for a threshold.
@@ -63,10 +85,15 @@ impl SparseLevel {
 /// The reason why a threshold is not known.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum NoThreshold {
-    /// Accuracy at L0 is not above chance, so that nothing can be lost.
+    /// Accuracy at L0 is not above the floor, so that nothing can be lost.
     NotAboveChance,
     /// A level from L0 to the one after the crossing has too few replies.
     Thin(SparseLevel),
+    /// The missing replies decide whether accuracy falls below half-way.
+    Missing {
+        /// Lower end of the interval, in EV: that of the bound with the largest loss.
+        low: f64,
+    },
 }
 
 /// Threshold and area of a curve.
@@ -79,6 +106,8 @@ pub struct CurveSummary {
     /// Mean accuracy from L0 to the darkest level, by the trapezoid rule over EV. Its `n` is the number of replies. `None` if
     /// no degraded level has enough replies.
     pub area: Option<Estimate>,
+    /// Accuracy of the floor: half of the distance from L0 to it is lost at the threshold.
+    pub floor: f64,
     /// Levels without enough replies, which are left out of the curve.
     pub left_out: Vec<SparseLevel>,
 }
@@ -90,8 +119,12 @@ pub struct LevelCounts {
     pub levels: Vec<AxisLevel>,
     /// Counts of each cluster, by level.
     pub counts: Vec<Vec<ClusterCount>>,
-    /// Expected number of right guesses among the replies at L0, by cluster.
+    /// Number of missing replies of each cluster, by level; a level without any may be empty.
+    pub missing: Vec<Vec<u32>>,
+    /// Expected number of right replies at L0 without the image, by guessing or by a model that sees no image, by cluster.
     pub guesses: Vec<f32>,
+    /// The same number for the missing replies at L0; empty without any.
+    pub missing_guesses: Vec<f32>,
 }
 
 impl LevelCounts {
@@ -108,10 +141,22 @@ impl LevelCounts {
             size.replies == 0 || size.is_fragment() || size.is_small() && !clean.is_small()
         });
         let curve = self.at_levels(&kept);
+        let area = (kept.len() > 1).then(|| curve.area()).flatten();
+        let (mut threshold, mut covering) = (curve.threshold(draws, &sizes), area);
+        if curve.missing.iter().flatten().any(|missing| *missing > 0) {
+            // The earliest crossing has the missing replies right at L0 and wrong elsewhere; the latest one the other way round.
+            let bounds = [true, false]
+                .map(|clean_is_right| curve.filled(clean_is_right, !clean_is_right))
+                .map(|curve| curve.threshold(draws, &sizes));
+            threshold = threshold.and_then(|threshold| threshold.bounded(&bounds));
+            let areas = [false, true].map(|are_right| curve.filled(are_right, are_right).area());
+            covering = area.map(|area| area.covering(areas.into_iter().flatten()));
+        }
         Some(CurveSummary {
             darkest: *curve.levels.last()?,
-            threshold: curve.threshold(draws, &sizes),
-            area: (kept.len() > 1).then(|| curve.area()).flatten(),
+            threshold,
+            area: covering,
+            floor: curve.floor(),
             left_out: left_out.into_iter().map(|index| sizes[index]).collect(),
         })
     }
@@ -139,7 +184,38 @@ impl LevelCounts {
                 .iter()
                 .map(|index| self.counts[*index].clone())
                 .collect(),
+            missing: kept
+                .iter()
+                .map(|index| self.missing[*index].clone())
+                .collect(),
             guesses: self.guesses.clone(),
+            missing_guesses: self.missing_guesses.clone(),
+        }
+    }
+
+    /// The counts with all missing replies filled in: as right or wrong at L0, and as right or wrong at the other levels.
+    fn filled(&self, clean_is_right: bool, others_are_right: bool) -> Self {
+        let counts = self.counts.iter().zip(&self.missing).enumerate();
+        let counts = counts.map(|(level, (counts, missing))| {
+            let are_right = if level == 0 {
+                clean_is_right
+            } else {
+                others_are_right
+            };
+            fill_missing(counts, missing, are_right)
+        });
+        let missing_guesses = self.missing_guesses.iter().copied();
+        Self {
+            levels: self.levels.clone(),
+            counts: counts.collect(),
+            missing: vec![Vec::new(); self.levels.len()],
+            guesses: self
+                .guesses
+                .iter()
+                .zip(missing_guesses.chain(std::iter::repeat(0.0)))
+                .map(|(guesses, missing)| guesses + missing)
+                .collect(),
+            missing_guesses: Vec::new(),
         }
     }
 
@@ -163,6 +239,12 @@ impl LevelCounts {
             .collect()
     }
 
+    /// Accuracy of the floor: the guesses per reply at L0.
+    fn floor(&self) -> f64 {
+        let guesses: f64 = self.guesses.iter().map(|x| f64::from(*x)).sum();
+        guesses / self.total(0, |count| count.replies)
+    }
+
     /// The threshold of the curve. `sizes` are the numbers of replies of all levels asked, including the levels left out of the curve.
     fn threshold(
         &self,
@@ -176,7 +258,7 @@ impl LevelCounts {
             .map(|(index, n)| self.total(index, |count| count.right) / n)
             .collect();
         let drops = self.drops();
-        let chance = self.guesses.iter().map(|x| f64::from(*x)).sum::<f64>() / replies[0];
+        let chance = self.floor();
         if let Some(clean) = sizes.first().filter(|size| size.is_thin()) {
             return Err(NoThreshold::Thin(*clean));
         }
@@ -368,7 +450,9 @@ mod tests {
                 .iter()
                 .map(|&(_, right, replies)| vec![ClusterCount { right, replies }; 12])
                 .collect(),
+            missing: vec![Vec::new(); levels.len()],
             guesses: vec![levels[0].2 as f32 / 4.0; 12],
+            missing_guesses: Vec::new(),
         }
     }
 

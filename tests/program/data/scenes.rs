@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::support::run::{Bench, words};
 use crate::support::snapshot::redacted;
@@ -105,4 +105,90 @@ fn scenes_cluster_and_are_named_later() {
     Sample         ·  With 12 scenes the intervals of the findings reach about 18
     ");
     assert!(records() == before);
+}
+
+/// The texts of the alerts of kind "clusters" in a summary.
+fn cluster_alerts(summary: &str) -> Vec<String> {
+    let summary: Value = serde_json::from_str(summary).unwrap();
+    let alerts = summary["alerts"].as_array().unwrap().iter();
+    alerts
+        .filter(|alert| alert["kind"] == "clusters")
+        .map(|alert| alert["text"].as_str().unwrap().to_owned())
+        .collect()
+}
+
+/// A set of frames with one question each, from the number of its picture and its scene.
+fn frames(bench: &Bench, frames: impl IntoIterator<Item = (u8, &'static str)>) {
+    let _ = fs::create_dir(bench.path("set"));
+    let mut lines = String::new();
+    for (number, (picture, scene)) in frames.into_iter().enumerate() {
+        let image = image::RgbImage::from_pixel(32, 24, image::Rgb([90, 60, picture]));
+        image
+            .save(bench.path(&format!("set/{number}.png")))
+            .unwrap();
+        let question = json!({
+            "id": format!("q{number}"), "frame": format!("{number}.png"), "scene": scene, "family": "color",
+            "question": format!("What color is it, {number}?"), "choices": ["red", "blue", "brown"], "answer": "brown",
+        });
+        lines.extend([question.to_string(), "\n".to_owned()]);
+    }
+    bench.file("set/questions.jsonl", lines);
+}
+
+fn summary(bench: &Bench, run: &str) -> String {
+    fs::read_to_string(bench.path(run).join("summary.json")).unwrap()
+}
+
+#[test]
+fn equal_files_count_as_one_frame() {
+    let bench = Bench::new();
+    frames(&bench, (0..40).map(|number| (number / 4, "")));
+    bench.complete(&words(RUN));
+    let expected = ["40 frames show 10 different pictures: equal pictures count as one frame."];
+    let stored = summary(&bench, "run");
+    assert_eq!(cluster_alerts(&stored), expected);
+    assert!(stored.contains("\"clusters\": 10.0"), "{stored}");
+    // A stored run, and two runs together.
+    bench.complete(&words(
+        &RUN.replace("L3", "L4").replace("--out run", "--out other"),
+    ));
+    for runs in ["run", "run other"] {
+        let report = bench.call(&words(&format!("report {runs} --json")));
+        assert_eq!(cluster_alerts(&report.stdout), expected);
+        assert!(report.stdout.contains("\"clusters\": 10.0"), "{report:?}");
+    }
+    let dry = bench.call(&words(&format!("{RUN} --dry-run")));
+    assert!(dry.stdout.contains("40 questions in 10 frames"), "{dry:?}");
+}
+
+#[test]
+fn few_scenes_are_clusters_with_an_alert() {
+    let bench = Bench::new();
+    let names = ["a", "b", "c", "d", "e"];
+    frames(
+        &bench,
+        (0..40).map(|number| (number, names[usize::from(number) % 5])),
+    );
+    bench.complete(&words(RUN));
+    let stored = summary(&bench, "run");
+    assert_eq!(
+        cluster_alerts(&stored),
+        ["Only 5 scenes (8 are needed): wide intervals, few possible verdicts."]
+    );
+    let report = bench.call(&words("report run"));
+    let text = report.stdout.replace("\n  ", " ");
+    assert!(text.contains("With 5 scenes no verdict"), "{text}");
+}
+
+#[test]
+fn frames_of_one_scene_are_clusters_with_an_alert() {
+    let bench = Bench::new();
+    frames(&bench, (0..12).map(|number| (number, "hall")));
+    bench.complete(&words(RUN));
+    assert_eq!(
+        cluster_alerts(&summary(&bench, "run")),
+        [
+            "All 12 frames are of one scene and count as independent: the results are about this scene alone. Take more scenes."
+        ]
+    );
 }

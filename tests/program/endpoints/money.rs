@@ -551,7 +551,7 @@ fn report_has_prices_that_run_had() {
     let printed = bench.complete(&args(&base, "--out run --prices prices.toml"));
     insta::assert_snapshot!(redacted(&printed), @"
     m · 1 question · 1 frame · 1 reply, 0 failed · intervals by question
-    ! Only 1 question (8 are needed): intervals and tests are rough.
+    ! Only 1 question (8 are needed): wide intervals, few possible verdicts.
 
      accuracy in %
      m            L0   95 %

@@ -245,9 +245,9 @@ fn dry_run_estimates_image_store() {
     Nothing was sent. 60 of 60 trials are left to ask.
     at no endpoint, built in: random 60
     image store: enhanced images 0.1 MB, room [MEMORY]: the next model finds about 100 % of them
-    power: 10 questions in 3 frames detects no difference between two conditions; 5 points need about 372 frames
+    power: 10 questions in 2 scenes detects no difference between two conditions; 5 points need about 276 scenes
         (one model; level 0.83 % after correction; assumed: 20 % of answers change without an effect, correlation
-        0.05 in a frame)
+        0.05 in a scene)
     only 3 frames (8 are needed): intervals and tests would be rough
     ");
     let narrow = bench.complete(&words(&format!(
@@ -257,9 +257,9 @@ fn dry_run_estimates_image_store() {
     Nothing was sent. 60 of 60 trials are left to ask.
     at no endpoint, built in: random 60
     image store: enhanced images 0.1 MB, room 0.0 MB: the next model finds about 19 % of them
-    power: 10 questions in 3 frames detects no difference between two conditions; 5 points need about 372 frames
+    power: 10 questions in 2 scenes detects no difference between two conditions; 5 points need about 276 scenes
         (one model; level 0.83 % after correction; assumed: 20 % of answers change without an effect, correlation
-        0.05 in a frame)
+        0.05 in a scene)
     only 3 frames (8 are needed): intervals and tests would be rough
     ");
     assert!(!narrow.contains(all), "{narrow}");

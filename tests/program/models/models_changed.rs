@@ -78,7 +78,7 @@ fn removed_model_is_excluded_but_kept() {
     exit code: 0
     stdout:
     two · 2 questions · 1 frame · 2 replies, 0 failed · intervals by question
-    ! Only 2 questions (8 are needed): intervals and tests are rough.
+    ! Only 2 questions (8 are needed): wide intervals, few possible verdicts.
     ! one and random are left out of run: the file of models has no such model any
       more, or has it with other settings; report --all shows all.
 
@@ -124,14 +124,14 @@ fn control_of_observer_goes_with_it() {
     assert!(has_control() && !shown.contains("left out"), "{shown}");
     let shown = complete(random, "");
     insta::assert_snapshot!(redacted(&shown), @"
-    random · 19 questions · 6 frames · 19 replies, 0 failed · intervals by frame
-    ! Only 6 frames (8 are needed): intervals and tests are rough.
+    random · 19 questions · 6 frames · 19 replies, 0 failed · intervals by scene
+    ! Only 3 scenes (8 are needed): wide intervals, few possible verdicts.
     ! observer and observer:other-room are left out of run: the file of models has
       no such model any more, or has it with other settings; report --all shows all.
 
      accuracy in %
      random       L0   95 %
-     untouched  52.6   −30.5 +28.7
+     untouched  52.6   −36.5 +33.9
      95 %: how far the widest interval of the row reaches down and up
      chance 38.6
     run: run
@@ -154,7 +154,7 @@ fn changed_settings_make_another_model() {
     exit code: 0
     stdout:
     m · 3 questions · 1 frame · 3 replies, 0 failed · intervals by question
-    ! Only 3 questions (8 are needed): intervals and tests are rough.
+    ! Only 3 questions (8 are needed): wide intervals, few possible verdicts.
     ! m (before) is left out of run: the file of models has no such model any more,
       or has it with other settings; report --all shows all.
 
@@ -283,7 +283,7 @@ fn renamed_models_separate_blind_replies() {
     exit code: 0
     stdout:
     x · 2 questions · 1 frame · 2 replies, 0 failed · intervals by question
-    ! Only 2 questions (8 are needed): intervals and tests are rough.
+    ! Only 2 questions (8 are needed): wide intervals, few possible verdicts.
     ! x (before) is left out of run: the file of models has no such model any more,
       or has it with other settings; report --all shows all.
 
@@ -371,7 +371,7 @@ fn model_columns_show_on_demand() {
     let short = bench.complete(&words(line));
     insta::assert_snapshot!(redacted(&short), @"
     2 models · 2 questions · 1 frame · 4 replies, 0 failed · intervals by question
-    ! Only 2 questions (8 are needed): intervals and tests are rough.
+    ! Only 2 questions (8 are needed): wide intervals, few possible verdicts.
 
      accuracy in %
      untouched    L0   95 %

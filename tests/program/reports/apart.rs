@@ -238,8 +238,8 @@ fn only_models_decide_worse() {
     let (code, _, stderr) = judged("report fewer --baseline few --fail-if-worse");
     assert_eq!(code, Some(2), "{stderr}");
     insta::assert_snapshot!(redacted(&stderr), @"
-    error: --fail-if-worse: no verdict against few is possible: no condition shares more than 4 questions, and 30
-        are needed; leave the flag out to see the report
+    error: --fail-if-worse: no verdict against few is possible on m L0, m L3-ev, m L3-noise and 1 more: no
+        condition shares more than 4 questions, and 30 are needed; leave the flag out to see the report
     ");
     // Reference models that are worse beside a model that is not.
     scene.run("", "m");

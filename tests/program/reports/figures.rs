@@ -258,6 +258,9 @@ fn sheet_names_models_not_asked() {
         another true answer. Its accuracy measures no sight.
     note: script:b.jsonl answers A whatever the image and the question: 20 of 20 replies to untouched images with
         another true answer. Its accuracy measures no sight.
+    note: One answer to everything scores well: “brown” is true of 20 of 20 questions about object recognition,
+        “red” is true of 20 of 20 questions about object colour. Ask without images too (--blind), and read the
+        balanced accuracy.
     note: The light differs: --seed is 0 in a-run and 1 in b-run. noise stands apart as @a-run and @b-run: 10 of
         10 shared images differ.
     note: Short names: a is script:a.jsonl, b is script:b.jsonl.

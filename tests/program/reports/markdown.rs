@@ -81,7 +81,7 @@ fn open_and_unlabelled_runs_have_markdown() {
 
     | model | light | L0 | L3 |
     | --- | --- | ---: | ---: |
-    | script:a.jsonl | with noise | 75.0 (46.8–91.1) | 75.0 (0.0) (46.8–91.1) |
+    | script:a.jsonl | with noise | 75.0 (2.9–99.7) | 75.0 (0.0) (2.9–99.7) |
 
     Made by darkqa-eval [VERSION].
     ");

@@ -230,7 +230,6 @@ fn runs_of_earlier_versions_are_read() {
     insta::assert_snapshot!(called.lines_with("chance"), @"
     exit code: 0
     chance: 33.33 over 3 questions
-    Darkness threshold in EV (half-way from L0 to chance) and mean accuracy in %, with 95 % intervals by question
     ");
     assert!(bench.path("run/report.html").is_file());
     let called = bench.call(&["show", "run", "q0"]);

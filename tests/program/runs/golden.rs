@@ -70,6 +70,6 @@ fn open_questions_with_marks_and_enhancer() {
     assert_eq!(digest(&house.0, "run"), OPENEQA);
 }
 
-const EVALUATION: &str = "52e6cd48be557002";
-const READINGS: &str = "1ff996285607f0dc";
-const OPENEQA: &str = "3b7d31e990034f68";
+const EVALUATION: &str = "8e01800e9ace7c5f";
+const READINGS: &str = "52b5a71d75add28e";
+const OPENEQA: &str = "67d50e1da3f5fbd7";

@@ -451,7 +451,7 @@ fn enhanced_walks_use_batch_and_page() {
     exit code: 0
     ! bright: 0..1 assumed. Neither sidecar nor preset states its value ranges, and its images of dark frames are
         plausible with 0..1.
-     m       with noise + bright          75.0 (0.0)   3 of 3   −28.2 +16.1
+     m       with noise + bright          75.0 (0.0)   3 of 3   −72.1 +24.7
      m       with noise + bright   hm3d-v0                        75.0 (0.0)   −57.6 +22.7
     ");
     assert!(silent.requests().is_empty());

@@ -117,8 +117,8 @@ fn comparison_needs_one_judge() {
     insta::assert_snapshot!(lines_with(&table, "script:"), @"
     Score in % (LLM-Match, marked by script:j.jsonl, protocol upstream): mean (difference from L0), and how far
         the widest 95 % interval over 2 episodes reaches down and up
-     script:a.jsonl   with noise   41.7   41.7 (0.0)   6 of 6   −22.3 +26.4
-     script:b.jsonl   with noise   41.7   41.7 (0.0)   6 of 6   −22.3 +26.4
+     script:a.jsonl   with noise   41.7   41.7 (0.0)   6 of 6   −40.9 +56.8
+     script:b.jsonl   with noise   41.7   41.7 (0.0)   6 of 6   −40.9 +56.8
      script:a.jsonl   with noise   hm3d-v0                 50.0   50.0 (0.0)   −41.8 +41.8
      script:b.jsonl   with noise   hm3d-v0                 50.0   50.0 (0.0)   −41.8 +41.8
     ");
@@ -132,7 +132,7 @@ fn comparison_needs_one_judge() {
     insta::assert_snapshot!(lines_with(&table, "(three)"), @"
     ! script:a.jsonl stands apart as script:a.jsonl (one) and script:a.jsonl (three): its file is d2db69ca… in one
         and 020b644a… in three; 6 of 6 replies to the same trials differ.
-     script:a.jsonl (three)   with noise   41.7   41.7 (0.0)   6 of 6   −22.3 +26.4
+     script:a.jsonl (three)   with noise   41.7   41.7 (0.0)   6 of 6   −40.9 +56.8
      script:a.jsonl (three)   with noise   hm3d-v0                 50.0   50.0 (0.0)   −41.8 +41.8
     ");
     fs::copy(house.0.path("j.jsonl"), house.0.path("k.jsonl")).unwrap();

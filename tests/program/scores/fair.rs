@@ -54,7 +54,7 @@ fn rotation_averages_position_bias() {
     let by_text = args("--out by-text --model script:script.jsonl --circular");
     insta::assert_snapshot!(redacted(&bench.complete(&by_text)), @"
     script:script.jsonl · 6 questions · 1 frame · 18 replies, 0 failed · intervals by question
-    ! Only 6 questions (8 are needed): intervals and tests are rough.
+    ! Only 6 questions (8 are needed): wide intervals, few possible verdicts.
 
      accuracy in %
      script:script.jsonl    L0   95 %
@@ -83,7 +83,7 @@ fn chance_follows_asked_questions() {
     // Two replies with a half and four with a quarter each: two of six, as for the one who always says A.
     let table = run(&bench, "--model script:script.jsonl --circular");
     insta::assert_snapshot!(lines_with(&table, "33.3"), @"
-     script:script.jsonl   untouched            33.3   6          0        0   −23.7 +36.7
+     script:script.jsonl   untouched            33.3   6          0        0   −33.0 +65.2
     chance: 33.33 over 6 orders of choices
     ");
     insta::assert_snapshot!(lines_with(&table, "chance"), @"

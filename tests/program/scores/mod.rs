@@ -4,4 +4,5 @@ mod confidence;
 mod coverage;
 mod fair;
 mod fidelity;
+mod flattered;
 mod statistics;

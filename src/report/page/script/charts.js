@@ -12,10 +12,12 @@ const draw_ = (tag, attributes, ...inside) => {
 // Colours are those of the style sheet; from the seventh line on they come again, with other dashes and marks.
 const COLOURS = 6;
 const CHANCE_STYLE = 27;
+// From this style on, a curve is that of a reference model, in the colour of the text.
+const REFERENCE_STYLES = 1000;
 const DASHES = ["", "9 5", "3 4", "14 5", "9 4 3 4", "18 4"];
 const WORDS_ALONE = ["14 6", "14 3 3 3", "6 3 2 3"];
 const CHANCE = "2 5";
-const colourOf = (line) => line.kind === "flat" ? "ink" : "line-" + line.style % COLOURS;
+const colourOf = (line) => line.kind === "flat" || line.style >= REFERENCE_STYLES ? "ink" : "line-" + line.style % COLOURS;
 const dashOf = (line, place) => {
   if (line.kind !== "flat") return DASHES[(line.style + Math.floor(line.style / COLOURS)) % DASHES.length];
   return line.style === CHANCE_STYLE ? CHANCE : WORDS_ALONE[place % WORDS_ALONE.length];

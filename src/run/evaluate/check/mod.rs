@@ -7,6 +7,7 @@ mod images;
 mod questions;
 mod settings;
 
+use std::collections::HashMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -150,7 +151,7 @@ fn check_data(
             lights: 1,
             has_noise: true,
         };
-        if let Some(power) = power_forecast(&dataset, &asked, sets) {
+        if let Some(power) = power_forecast(&dataset, &asked, &HashMap::new(), sets) {
             findings.ok(power.line());
         }
     }

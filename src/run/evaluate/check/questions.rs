@@ -8,9 +8,7 @@ use crate::types::Question;
 use crate::types::questions::letter;
 use crate::types::text::counted;
 use crate::types::text::excerpt;
-
-/// Share of one true answer or letter above which a constant reply scores well.
-const MAX_SHARE: f64 = 0.6;
+use darkqa_score::accuracies::MAX_ANSWER_SHARE;
 
 /// Maximum number of families listed.
 const MAX_FAMILIES: usize = 12;
@@ -72,7 +70,7 @@ fn warn_of_common_answers(questions: &[Question], findings: &mut Findings) {
             continue;
         };
         let share = *count as f64 / questions.len() as f64;
-        if share >= MAX_SHARE {
+        if share >= MAX_ANSWER_SHARE {
             findings.warn(format!(
                 "always the {what} {:?} scores {:.0} %; ask the model without images too (--blind-model NAME), or show the choices in other orders (--choice-order shuffle)",
                 excerpt(answer, 60),

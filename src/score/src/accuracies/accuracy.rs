@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::balance::{UnbalancedFamily, balanced_accuracy};
 use super::chance::{OfferedChoices, chance, chance_of_questions};
 use super::health::Health;
 use crate::choice::ParsingMode;
@@ -28,11 +29,13 @@ pub struct AccuracyCell {
     pub unparsed: usize,
     /// Number of trials without a reply. They are not scored.
     pub failed: usize,
-    /// Share of right replies among all replies; `None` if there is no reply.
+    /// Share of right replies among all replies; `None` if there is no reply. Its interval holds for all values of the missing replies.
     pub accuracy: Option<Estimate>,
     /// Share of questions answered correctly every time: in every order of the choices (MMBench's circular evaluation,
     /// Liu et al. 2023, arXiv:2307.06281, section 4.2) and in every repeat. `None` if each question was asked once.
     pub always: Option<Estimate>,
+    /// Accuracy with all true answers weighted alike ([`balanced_accuracy`]); `None` if no family is unbalanced.
+    pub balanced: Option<f64>,
 }
 
 impl AccuracyCell {
@@ -40,6 +43,15 @@ impl AccuracyCell {
     #[must_use]
     pub fn replies(&self) -> usize {
         self.accuracy.map_or(0, |accuracy| accuracy.n)
+    }
+
+    /// Accuracy if all missing replies were wrong, and if all were right (the bounds of Manski 1990, Am. Econ. Rev. 80:319); `None` if no
+    /// reply is missing, or if there is none.
+    #[must_use]
+    pub fn bounds(&self) -> Option<[f64; 2]> {
+        let all = (self.replies() + self.failed) as f64;
+        let has_bounds = self.accuracy.is_some() && self.failed > 0;
+        has_bounds.then(|| [self.right, self.right + self.failed].map(|right| right as f64 / all))
     }
 }
 
@@ -52,6 +64,9 @@ pub struct AccuracySummary {
     /// Chance with each question counted once, if several orders of choices are asked and this changes chance.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub chance_of_questions: Option<Estimate>,
+    /// Families of which one answer is true so often that accuracy misleads.
+    #[serde(skip)]
+    pub unbalanced: Vec<UnbalancedFamily>,
 }
 
 impl AccuracySummary {
@@ -90,6 +105,7 @@ pub(crate) fn summarize(
 ) -> AccuracySummary {
     let questions: Vec<OfferedChoices> = questions.into_iter().collect();
     let families = grid.groups();
+    let unbalanced = UnbalancedFamily::all(grid);
     let mut cells: Vec<AccuracyCell> = (0..grid.subjects.len())
         .into_par_iter()
         .flat_map_iter(|subject| {
@@ -97,6 +113,7 @@ pub(crate) fn summarize(
                 ParsingMode::ALL.map(|mode| cell(grid, subject, *family, mode))
             })
         })
+        .map(|cell| with_balance(grid, cell, &unbalanced))
         .collect();
     // A family that a subject was not asked about gets no cell.
     cells.retain(|cell| cell.accuracy.is_some() || cell.failed > 0);
@@ -105,6 +122,27 @@ pub(crate) fn summarize(
         cells,
         unread: unread(health),
         chance_of_questions: chance_of_questions(&questions),
+        unbalanced,
+    }
+}
+
+/// The cell with its balanced accuracy, if one of its families is unbalanced.
+fn with_balance(
+    grid: &Grid<'_>,
+    cell: AccuracyCell,
+    unbalanced: &[UnbalancedFamily],
+) -> AccuracyCell {
+    let family = cell.family.as_ref();
+    let is_unbalanced = unbalanced
+        .iter()
+        .any(|one| family.is_none_or(|family| one.family == *family));
+    if !is_unbalanced {
+        return cell;
+    }
+    let subject = grid.find(&cell.subject);
+    AccuracyCell {
+        balanced: subject.and_then(|subject| balanced_accuracy(grid, subject, family, cell.mode)),
+        ..cell
     }
 }
 
@@ -143,8 +181,9 @@ fn cell(
         right: counts.iter().map(|count| count.right as usize).sum(),
         unparsed,
         failed,
-        accuracy: Estimate::clustered(&counts),
+        accuracy: Estimate::with_missing(&counts, &grid.failed(subject, family)),
         always: always(grid, subject, family, mode),
+        balanced: None,
     }
 }
 
@@ -221,6 +260,7 @@ fn chance_cells(questions: &[OfferedChoices]) -> Vec<AccuracyCell> {
                 failed: 0,
                 accuracy,
                 always: None,
+                balanced: None,
             })
         })
         .collect()

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use crate::bootstrap::Resamples;
 use crate::choice::ParsingMode;
 use crate::grid::{Grid, TrialResult};
+use crate::model_in_condition::ModelInCondition;
 use crate::threshold::{CurveSummary, LevelCounts};
 use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{Axis, AxisLevel, EnhancerName, Family, RunGroup, Variant, View};
@@ -18,6 +19,8 @@ pub struct Curve {
     pub enhancer: Option<EnhancerName>,
     /// Question family; `None` for all families together.
     pub family: Option<Family>,
+    /// True if the floor is the accuracy of the model itself without images; false if it is that of guessing.
+    pub floor_is_blind: bool,
     /// Threshold and area in the strict parsing, which is the main result.
     pub summary: CurveSummary,
     /// Threshold and area in the lenient parsing.
@@ -111,14 +114,24 @@ fn curve(
     points: CurvePoints,
 ) -> Option<Curve> {
     let subjects = &points.subjects;
-    let [strict, lenient] = ParsingMode::ALL.map(|mode| LevelCounts {
-        levels: subjects.iter().map(|(level, _)| *level).collect(),
-        counts: subjects
-            .iter()
-            .map(|(_, subject)| grid.counts(*subject, family, mode))
-            .collect(),
-        guesses: guesses(grid, subjects[0].1, family),
-    });
+    let clean = subjects[0].1;
+    let blind = grid.find_up_to_group(&ModelInCondition::new(&points.model, None));
+    let floors = ParsingMode::ALL.map(|mode| Floor::new(grid, clean, blind, family, mode));
+    let [strict, lenient] = [0, 1]
+        .map(|index| (ParsingMode::ALL[index], &floors[index]))
+        .map(|(mode, floor)| LevelCounts {
+            levels: subjects.iter().map(|(level, _)| *level).collect(),
+            counts: subjects
+                .iter()
+                .map(|(_, subject)| grid.counts(*subject, family, mode))
+                .collect(),
+            missing: subjects
+                .iter()
+                .map(|(_, subject)| grid.failed(*subject, family))
+                .collect(),
+            guesses: floor.replies.clone(),
+            missing_guesses: floor.missing.clone(),
+        });
     let summary = strict.summary(draws)?;
     Some(Curve {
         lenient: if lenient.counts == strict.counts {
@@ -126,6 +139,7 @@ fn curve(
         } else {
             lenient.summary(draws)?
         },
+        floor_is_blind: floors[0].is_blind,
         summary,
         model: points.model,
         variant: points.variant,
@@ -134,11 +148,83 @@ fn curve(
     })
 }
 
-/// Expected number of right guesses among the replies at L0, by cluster.
-fn guesses(grid: &Grid<'_>, clean: usize, family: Option<&Family>) -> Vec<f32> {
+/// Expected numbers of right replies at L0 without the image, by cluster.
+struct Floor {
+    /// Among the replies.
+    replies: Vec<f32>,
+    /// Among the missing replies.
+    missing: Vec<f32>,
+    /// True if they are those of the model itself, asked without images; false if they are those of guessing.
+    is_blind: bool,
+}
+
+impl Floor {
+    /// The floor of a model: its own accuracy without images, because only what images add can be lost in the dark; or that of guessing, if
+    /// it is larger or the model was not asked without images.
+    fn new(
+        grid: &Grid<'_>,
+        clean: usize,
+        blind: Option<usize>,
+        family: Option<&Family>,
+        mode: ParsingMode,
+    ) -> Self {
+        let replies = guesses(grid, clean, family, TrialResult::is_reply);
+        let missing = guesses(grid, clean, family, |result| result == TrialResult::Failed);
+        let guessing = Self {
+            replies,
+            missing,
+            is_blind: false,
+        };
+        let Some(blind) = blind else {
+            return guessing;
+        };
+        let blind = grid.counts(blind, family, mode);
+        let [right, blind_replies] = [
+            blind
+                .iter()
+                .map(|count| f64::from(count.right))
+                .sum::<f64>(),
+            blind.iter().map(|count| f64::from(count.replies)).sum(),
+        ];
+        let clean_counts = grid.counts(clean, family, mode);
+        let clean_replies: f64 = clean_counts
+            .iter()
+            .map(|count| f64::from(count.replies))
+            .sum();
+        let guessed: f64 = guessing
+            .replies
+            .iter()
+            .map(|guesses| f64::from(*guesses))
+            .sum();
+        if blind_replies == 0.0 || right / blind_replies <= guessed / clean_replies {
+            return guessing;
+        }
+        let scale = clean_replies / blind_replies;
+        Self {
+            replies: blind
+                .iter()
+                .map(|count| (f64::from(count.right) * scale) as f32)
+                .collect(),
+            missing: grid
+                .failed(clean, family)
+                .iter()
+                .map(|failed| (f64::from(*failed) * right / blind_replies) as f32)
+                .collect(),
+            is_blind: true,
+        }
+    }
+}
+
+/// Expected number of right guesses among the results at L0 for which `counts` is true, by cluster.
+fn guesses(
+    grid: &Grid<'_>,
+    clean: usize,
+    family: Option<&Family>,
+    counts: impl Fn(TrialResult) -> bool,
+) -> Vec<f32> {
     let mut guesses = vec![0.0_f32; grid.clusters];
     for (item, result) in grid.family_items(clean, family) {
-        if let TrialResult::Read { .. } = result {
+        if counts(result) {
             guesses[item.cluster as usize] += 1.0 / item.asked.choices.len() as f32;
         }
     }

@@ -1,6 +1,7 @@
 //! Accuracies of models in each condition and over the levels, compared with chance.
 
 mod accuracy;
+mod balance;
 mod chance;
 mod common;
 mod coverage;
@@ -11,6 +12,7 @@ mod strict_score;
 
 pub(super) use accuracy::summarize;
 pub use accuracy::{AccuracyCell, AccuracySummary};
+pub use balance::{MAX_ANSWER_SHARE, UnbalancedFamily};
 pub use chance::OfferedChoices;
 pub(super) use common::CommonItems;
 pub use common::shared_items;

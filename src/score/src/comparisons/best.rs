@@ -1,20 +1,22 @@
 //! Ranking of models by accuracy in the dark: [`BestInTheDark`].
 
+mod scores;
+
 use std::collections::BTreeSet;
-use std::ops::Range;
 
 use super::comparison::compares_models;
-use super::holm_of;
-use super::paired::{ClusterNet, PairedTest};
 use super::pooled::pool;
 use crate::accuracies::{Coverage, shared};
 use crate::choice::ParsingMode;
-use crate::estimate::{ClusterCount, Estimate};
 use crate::grid::Grid;
 use crate::model_in_condition::ModelInCondition;
-use crate::significance::{ALPHA, Significance, SwapMethod, least_p};
+use crate::significance::{ALPHA, Significance, least_p};
 use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{AxisLevel, Variant};
+
+use scores::Scores;
+
+pub use scores::{Crossing, DarkAccuracy, DarkGain, DarkPair, LevelLead};
 
 /// Comparison of the models by mean accuracy over the dark levels ([`is_dark`]), with equal weights, on images without an enhancer.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,12 +37,13 @@ pub struct BestInTheDark {
     pub not_shown_better_than: Vec<String>,
     /// All pairs of models, in the order of `models`.
     pub pairs: Vec<DarkPair>,
-    /// Change of order between the leader at the lighter levels and the leader in the dark; `None` if both are one model or their order
-    /// changes more than once.
+    /// Whether the leader sees anything in the dark.
+    pub gain: DarkGain,
+    /// Comparison by level of the leader at the lighter levels with the leader in the dark; `None` if both are one model.
     pub crossing: Option<Crossing>,
     /// Number of items that every model answered at every level.
     pub items: usize,
-    /// Number of items left out because a reply is missing or unread. At least one model was asked them at every level.
+    /// Number of items left out because a reply is missing. At least one model was asked them at every level.
     pub dropped: usize,
     /// Number of clusters of the items.
     pub clusters: usize,
@@ -71,6 +74,18 @@ impl BestInTheDark {
         self.not_shown_better_than.is_empty()
     }
 
+    /// Verdict of a pair in tables, which is that of the sentence; `None` for pairs without the leader, which no sentence is about.
+    /// `is_detected` is true if the leader is detected to be the best.
+    #[must_use]
+    pub fn verdict(&self, pair: &DarkPair, is_detected: bool) -> Option<Significance> {
+        match pair.significance {
+            own if !own.is_possible() => Some(own),
+            _ if pair.first != self.leader().model => None,
+            _ if is_detected => Some(Significance::Better),
+            _ => Some(Significance::NotShown),
+        }
+    }
+
     /// True if the leader is significantly the best, also after the correction over all tests that the report's sentences use.
     #[must_use]
     pub fn is_detected(&self) -> bool {
@@ -85,64 +100,6 @@ impl BestInTheDark {
             .filter(|pair| pair.first == self.leader().model)
             .map(|pair| pair.holm)
             .fold(0.0, f64::max)
-    }
-}
-
-/// Accuracies of one model, on the items that all models answered.
-#[derive(Debug, Clone, PartialEq)]
-pub struct DarkAccuracy {
-    pub model: String,
-    /// Mean accuracy over the dark levels.
-    pub mean: Estimate,
-    /// Mean accuracy over the lighter levels.
-    pub lighter: f64,
-    /// Accuracy at each level, the lighter ones first.
-    pub by_level: Vec<f64>,
-    /// Accuracy at L0, on the same items.
-    pub clean: Estimate,
-    /// `mean` minus the accuracy at L0. `None` if the accuracy at L0 is not above chance, so that nothing can be lost.
-    pub loss: Option<Estimate>,
-}
-
-/// Comparison of two models by mean accuracy over the dark levels, on the items that all models answered.
-#[derive(Debug, Clone, PartialEq)]
-pub struct DarkPair {
-    pub first: String,
-    pub second: String,
-    /// Mean accuracy of `first` minus mean accuracy of `second`.
-    pub difference: Estimate,
-    /// p-value of the null hypothesis of no difference.
-    pub p: f64,
-    /// Method that computed `p`.
-    pub p_by: SwapMethod,
-    /// p-value after Holm's correction over all pairs of models.
-    pub holm: f64,
-    pub significance: Significance,
-}
-
-/// Two models whose order changes once with the level.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Crossing {
-    /// Leader at the lighter levels, and the last level before the change of order.
-    pub before: (String, AxisLevel),
-    /// Leader in the dark, and the first level after the change of order.
-    pub after: (String, AxisLevel),
-    /// Mean accuracy of the `before` model minus the `after` model, over the levels before the change of order.
-    pub lead: Estimate,
-    /// Mean accuracy of the `before` model minus the `after` model, over the levels after the change of order.
-    pub lag: Estimate,
-    /// Larger p-value of `lead` and `lag`, times the number of gaps between levels and the number of pairs of models (Bonferroni over the
-    /// possible places of the change and the pairs that could have led).
-    pub p: f64,
-    /// `p` after the correction over all tests that the report's sentences use; `None` before that correction.
-    pub p_report: Option<f64>,
-}
-
-impl Crossing {
-    /// True if `p_report` is significant.
-    #[must_use]
-    pub fn is_detected(&self) -> bool {
-        self.p_report.is_some_and(|value| value < ALPHA)
     }
 }
 
@@ -207,7 +164,8 @@ pub fn best_in_the_dark(grid: &Grid<'_>, mode: ParsingMode) -> Option<BestInTheD
         .collect();
     models.sort_by(|(a, _), (b, _)| b.mean.value.total_cmp(&a.mean.value));
     let pairs = scores.pairs(&models, split);
-    let leader = &models.first()?.0.model;
+    let (leader, leader_index) = models.first()?;
+    let leader = &leader.model;
     let clusters = scores.clusters();
     Some(BestInTheDark {
         not_shown_better_than: pairs
@@ -215,6 +173,7 @@ pub fn best_in_the_dark(grid: &Grid<'_>, mode: ParsingMode) -> Option<BestInTheD
             .filter(|pair| pair.first == *leader && pair.significance != Significance::Better)
             .map(|pair| pair.second.clone())
             .collect(),
+        gain: scores.gain(*leader_index, split)?,
         crossing: scores.crossing(&models, &levels),
         variant,
         levels: dark.to_vec(),
@@ -279,234 +238,4 @@ fn split_by_coverage<'g>(
         }
     }
     (complete, incomplete)
-}
-
-/// Scores of all models on one item that every model answered at every level.
-struct ItemScores {
-    /// Index of the item's cluster.
-    cluster: usize,
-    /// True if a model is right at a level; by model, then by level.
-    right: Vec<Vec<bool>>,
-    /// Probability of a right guess.
-    guess: f64,
-}
-
-impl ItemScores {
-    /// Number of levels in a range at which a model is right.
-    fn right_count(&self, model: usize, levels: &Range<usize>) -> i64 {
-        self.right[model][levels.clone()]
-            .iter()
-            .map(|right| i64::from(*right))
-            .sum()
-    }
-}
-
-/// Scores of all models on the items that every model answered at every level.
-struct Scores {
-    items: Vec<ItemScores>,
-    /// Number of levels.
-    levels: usize,
-    /// Number of items left out because a reply is missing or unread (see [`BestInTheDark::dropped`]).
-    dropped: usize,
-    /// Number of clusters of the whole grid.
-    all_clusters: usize,
-}
-
-impl Scores {
-    fn new(
-        grid: &Grid<'_>,
-        models: &[&str],
-        variant: &Variant,
-        levels: &[AxisLevel],
-        mode: ParsingMode,
-    ) -> Self {
-        let subjects: Vec<Vec<usize>> = models
-            .iter()
-            .map(|model| {
-                levels
-                    .iter()
-                    .map(|level| ModelInCondition::with_images(model, *level, variant, None))
-                    .filter_map(|subject| grid.find_up_to_group(&subject))
-                    .collect()
-            })
-            .collect();
-        let mut scores = Self {
-            items: Vec::new(),
-            levels: levels.len(),
-            dropped: 0,
-            all_clusters: grid.clusters,
-        };
-        for (index, item) in grid.items.iter().enumerate() {
-            let right: Option<Vec<Vec<bool>>> = subjects
-                .iter()
-                .map(|levels| {
-                    levels
-                        .iter()
-                        .map(|subject| {
-                            let reading = grid.result(*subject, index).reading(mode);
-                            reading.map(|chosen| item.is_right(chosen))
-                        })
-                        .collect()
-                })
-                .collect();
-            let Some(right) = right else {
-                let is_asked = subjects.iter().any(|levels| {
-                    levels
-                        .iter()
-                        .all(|subject: &usize| grid.result(*subject, index).is_asked())
-                });
-                scores.dropped += usize::from(is_asked);
-                continue;
-            };
-            scores.items.push(ItemScores {
-                cluster: item.cluster as usize,
-                right,
-                guess: 1.0 / item.asked.choices.len() as f64,
-            });
-        }
-        scores
-    }
-
-    /// Number of clusters with at least one item.
-    fn clusters(&self) -> usize {
-        self.cluster_sums(|_| 0).len()
-    }
-
-    /// Sums of a value over the items, for each cluster with at least one item.
-    fn cluster_sums(&self, value: impl Fn(&ItemScores) -> i64) -> Vec<ClusterNet> {
-        let mut sums = vec![ClusterNet { net: 0, items: 0 }; self.all_clusters];
-        for item in &self.items {
-            let sum = &mut sums[item.cluster];
-            sum.net += value(item);
-            sum.items += 1;
-        }
-        sums.retain(|sum| sum.items > 0);
-        sums
-    }
-
-    /// Tests the mean of a difference by item. `scale` is the largest possible difference of an item.
-    fn test(&self, scale: usize, difference: impl Fn(&ItemScores) -> i64) -> PairedTest {
-        let squares: i64 = self.items.iter().map(|item| difference(item).pow(2)).sum();
-        PairedTest::new(
-            &self.cluster_sums(&difference),
-            scale as f64,
-            squares as f64,
-        )
-    }
-
-    /// Tests the mean accuracy of the first model minus that of the second over a range of levels.
-    fn test_pair(&self, [first, second]: [usize; 2], levels: Range<usize>) -> PairedTest {
-        self.test(levels.len(), |item| {
-            item.right_count(first, &levels) - item.right_count(second, &levels)
-        })
-    }
-
-    /// Computes the accuracies of the model with index `model`. Levels from index `split` on are dark.
-    fn accuracy(&self, model: usize, name: &str, split: usize) -> Option<DarkAccuracy> {
-        let (n, dark) = (self.items.len(), split..self.levels);
-        let by_level: Vec<f64> = (0..self.levels)
-            .map(|level: usize| {
-                self.items
-                    .iter()
-                    .filter(|item| item.right[model][level])
-                    .count() as f64
-                    / n as f64
-            })
-            .collect();
-        let count = dark.len() as f64;
-        let sums: Vec<(f64, f64)> = self
-            .cluster_sums(|item| item.right_count(model, &dark))
-            .into_iter()
-            .map(|sum| (sum.net as f64 / count, f64::from(sum.items)))
-            .collect();
-        let clean_counts: Vec<ClusterCount> = self
-            .cluster_sums(|item| item.right_count(model, &(0..1)))
-            .into_iter()
-            .map(|sum| ClusterCount {
-                right: sum.net as u32,
-                replies: sum.items,
-            })
-            .collect();
-        let clean = Estimate::clustered(&clean_counts)?;
-        let chance = self.items.iter().map(|item| item.guess).sum::<f64>() / n as f64;
-        let loss = (clean.low > chance).then(|| {
-            self.test(dark.len(), |item| {
-                item.right_count(model, &dark)
-                    - item.right_count(model, &(0..1)) * dark.len() as i64
-            })
-            .difference
-        });
-        Some(DarkAccuracy {
-            model: name.to_owned(),
-            mean: Estimate::from_scores(&sums, count, n)?,
-            lighter: by_level[..split].iter().sum::<f64>() / split as f64,
-            by_level,
-            clean,
-            loss,
-        })
-    }
-
-    /// Tests all pairs of `models`, which come with their indices in the scores. Levels from index `split` on are dark.
-    fn pairs(&self, models: &[(DarkAccuracy, usize)], split: usize) -> Vec<DarkPair> {
-        let mut pairs = Vec::new();
-        for (index, (first, a)) in models.iter().enumerate() {
-            for (second, b) in &models[index + 1..] {
-                let tested = self.test_pair([*a, *b], split..self.levels);
-                pairs.push(DarkPair {
-                    first: first.model.clone(),
-                    second: second.model.clone(),
-                    difference: tested.difference,
-                    p: tested.p,
-                    p_by: tested.by,
-                    holm: 1.0,
-                    significance: Significance::NotShown,
-                });
-            }
-        }
-        let corrected = holm_of(pairs.iter().map(|pair| pair.p));
-        let least_holm = pairs.len() as f64 * least_p(self.clusters());
-        for (pair, holm) in pairs.iter_mut().zip(corrected) {
-            pair.holm = holm;
-            pair.significance = Significance::new(pair.difference.value, holm, least_holm);
-        }
-        pairs
-    }
-
-    /// Tests the change of order between the leader at the lighter levels and the leader in the dark. `None` if both are the same model, or
-    /// if their order does not change exactly once.
-    fn crossing(&self, models: &[(DarkAccuracy, usize)], levels: &[AxisLevel]) -> Option<Crossing> {
-        let (dark, dark_index) = models.first()?;
-        // `max_by` returns the last of equal elements; with `rev` that is the model with the higher accuracy in the dark.
-        let (light, light_index) = models
-            .iter()
-            .rev()
-            .max_by(|(a, _), (b, _)| a.lighter.total_cmp(&b.lighter))?;
-        let lead_by_level: Vec<f64> = light
-            .by_level
-            .iter()
-            .zip(&dark.by_level)
-            .map(|(light, dark)| light - dark)
-            .collect();
-        let split = (1..self.levels).find(|level| lead_by_level[*level] < 0.0)?;
-        let changes_once = lead_by_level[..split].iter().all(|lead| *lead >= 0.0)
-            && lead_by_level[split..].iter().all(|lead| *lead <= 0.0);
-        if !changes_once || dark_index == light_index {
-            return None;
-        }
-        let pair = [*light_index, *dark_index];
-        let (lead, lag) = (
-            self.test_pair(pair, 0..split),
-            self.test_pair(pair, split..self.levels),
-        );
-        let gaps = self.levels - 1;
-        let pairs = models.len() * (models.len() - 1) / 2;
-        Some(Crossing {
-            before: (light.model.clone(), levels[split - 1]),
-            after: (dark.model.clone(), levels[split]),
-            lead: lead.difference,
-            lag: lag.difference,
-            p: ((gaps * pairs) as f64 * lead.p.max(lag.p)).min(1.0),
-            p_report: None,
-        })
-    }
 }

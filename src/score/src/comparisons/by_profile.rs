@@ -10,10 +10,10 @@ use std::collections::BTreeSet;
 
 use rayon::prelude::*;
 
-use super::paired::{ClusterNet, PairedTest};
+use super::paired::{BoundedSums, net_bounds};
 use crate::choice::ParsingMode;
 use crate::estimate::Estimate;
-use crate::grid::Grid;
+use crate::grid::{Grid, TrialResult};
 use crate::model_in_condition::ModelInCondition;
 use crate::significance::{ALPHA, holm};
 use darkqa_ground::types::degradations::Kind;
@@ -184,7 +184,8 @@ pub struct FindingByProfile {
     pub effects: Vec<EffectInProfile>,
     /// Summary over all profiles.
     pub robustness: Robustness,
-    /// Number of items left out because they were asked, but not answered on every side, level and profile.
+    /// Number of items that were asked, but not answered on every side, level and profile. The effects hold for all values of the missing
+    /// replies.
     pub dropped: usize,
 }
 
@@ -349,10 +350,10 @@ fn finding(
                 .unwrap_or_default()
         })
         .collect();
-    let (kept, dropped) = shared_items(lookup.grid, &pairs, claim.family());
+    let shared = SharedItems::new(lookup.grid, &pairs, claim.family());
     let effects: Vec<Option<TestedEffect>> = pairs
         .iter()
-        .map(|pairs| effect(lookup.grid, pairs, &kept))
+        .map(|pairs| shared.effect(lookup.grid, pairs))
         .collect();
     if effects.iter().all(Option::is_none) {
         return None;
@@ -376,7 +377,7 @@ fn finding(
                 effect,
             })
             .collect(),
-        dropped,
+        dropped: shared.dropped,
     })
 }
 
@@ -393,69 +394,84 @@ fn asked_levels(
         .collect()
 }
 
-/// Indices of a family's items with a reply on both sides of all pairs, and the number of its other items that were asked on any side.
-fn shared_items(
-    grid: &Grid<'_>,
-    pairs: &[Vec<(usize, usize)>],
-    family: Option<&Family>,
-) -> (Vec<usize>, usize) {
-    let subjects: BTreeSet<usize> = pairs
-        .iter()
-        .flatten()
-        .flat_map(|(first, second)| [*first, *second])
-        .collect();
-    let (kept, dropped) = grid
-        .items
-        .iter()
-        .enumerate()
-        .filter(|(_, item)| item.is_in_family(family))
-        .map(|(index, _)| index)
-        .filter(|item| {
-            subjects
-                .iter()
-                .any(|subject| grid.result(*subject, *item).is_asked())
-        })
-        .partition::<Vec<_>, _>(|item| {
-            subjects
-                .iter()
-                .all(|subject| grid.result(*subject, *item).is_reply())
-        });
-    (kept, dropped.len())
+/// Items of a family that are compared under all profiles.
+struct SharedItems {
+    /// Indices of the items with a reply on both sides of all pairs.
+    answered: Vec<usize>,
+    /// Indices of the other items that were asked on both sides of all pairs.
+    missing: Vec<usize>,
+    /// Number of items that were asked on any side, and are not answered on all.
+    dropped: usize,
 }
 
-/// Tests the accuracy of the first sides minus that of the second sides, averaged over the pairs, on the items of `kept`. `None` without
-/// pairs or items.
-fn effect(grid: &Grid<'_>, pairs: &[(usize, usize)], kept: &[usize]) -> Option<TestedEffect> {
-    if pairs.is_empty() || kept.is_empty() {
-        return None;
-    }
-    let mut clusters = vec![ClusterNet { net: 0, items: 0 }; grid.clusters];
-    let mut sum_of_squares = 0;
-    for &index in kept {
-        let item = &grid.items[index];
-        let net: i64 = pairs
+impl SharedItems {
+    fn new(grid: &Grid<'_>, pairs: &[Vec<(usize, usize)>], family: Option<&Family>) -> Self {
+        let subjects: BTreeSet<usize> = pairs
             .iter()
-            .map(|(first, second)| {
-                let [first, second] = [first, second].map(|subject| {
-                    let reading = grid.result(*subject, index).reading(ParsingMode::Strict);
-                    i64::from(reading.is_some_and(|chosen| item.is_right(chosen)))
-                });
-                first - second
-            })
-            .sum();
-        let cluster = &mut clusters[item.cluster as usize];
-        cluster.net += net;
-        cluster.items += 1;
-        sum_of_squares += net * net;
+            .flatten()
+            .flat_map(|(first, second)| [*first, *second])
+            .collect();
+        let mut shared = Self {
+            answered: Vec::new(),
+            missing: Vec::new(),
+            dropped: 0,
+        };
+        for (index, item) in grid.items.iter().enumerate() {
+            if !item.is_in_family(family) {
+                continue;
+            }
+            let mut results = subjects.iter().map(|subject| grid.result(*subject, index));
+            if results.clone().all(TrialResult::is_reply) {
+                shared.answered.push(index);
+            } else if results.clone().all(TrialResult::is_asked) {
+                shared.missing.push(index);
+                shared.dropped += 1;
+            } else {
+                shared.dropped += usize::from(results.any(TrialResult::is_asked));
+            }
+        }
+        shared
     }
-    clusters.retain(|cluster| cluster.items > 0);
-    let tested = PairedTest::new(&clusters, pairs.len() as f64, sum_of_squares as f64);
-    Some(TestedEffect {
-        support: Support::Open,
-        difference: tested.difference,
-        p: tested.p,
-        holm: tested.p,
-    })
+
+    /// Tests the accuracy of the first sides minus that of the second sides, averaged over the pairs. `None` without pairs or answered
+    /// items.
+    fn effect(&self, grid: &Grid<'_>, pairs: &[(usize, usize)]) -> Option<TestedEffect> {
+        if pairs.is_empty() {
+            return None;
+        }
+        // Smallest and largest difference of an item; a pair without any reply counts as equal.
+        let bounds = |index: usize| {
+            let item = &grid.items[index];
+            pairs
+                .iter()
+                .map(|(first, second)| {
+                    [*first, *second].map(|subject| {
+                        let reading = grid.result(subject, index).reading(ParsingMode::Strict);
+                        reading.map(|chosen| item.is_right(chosen))
+                    })
+                })
+                .filter(|sides| sides.iter().any(Option::is_some))
+                .map(net_bounds)
+                .fold([0, 0], |sum, bounds| {
+                    [sum[0] + bounds[0], sum[1] + bounds[1]]
+                })
+        };
+        let mut sums = BoundedSums::new(grid.clusters);
+        for &index in &self.answered {
+            sums.add(grid.items[index].cluster, bounds(index)[0]);
+        }
+        for &index in &self.missing {
+            let [lowest, highest] = bounds(index);
+            sums.add_missing(grid.items[index].cluster, lowest, highest);
+        }
+        let tested = sums.test(pairs.len() as f64)?;
+        Some(TestedEffect {
+            support: Support::Open,
+            difference: tested.difference,
+            p: tested.p,
+            holm: tested.p,
+        })
+    }
 }
 
 /// Fills in the corrected p-values, test results and summaries, with Holm's correction over all findings and profiles.

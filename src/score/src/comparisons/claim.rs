@@ -11,6 +11,8 @@ pub enum Claim {
     StrictOnly(Significance),
     /// Detected only by the correction within its own set of tests.
     InOwnSet,
+    /// The missing replies decide whether a difference is detected.
+    Missing,
     /// Not detected.
     Open,
     /// No verdict is possible with so few clusters or items.
@@ -43,6 +45,18 @@ impl ParsedFinding {
 }
 
 impl Claim {
+    /// Verdict of a finding in tables, which is that of the sentences. `own` is its verdict within its own set of tests, and `p_report` its
+    /// p-value after the correction over all sentences. `None` if no sentence is about the finding.
+    pub(super) fn verdict(self, own: Significance, p_report: Option<f64>) -> Option<Significance> {
+        match self {
+            _ if !own.is_possible() => Some(own),
+            _ if p_report.is_none() => None,
+            Self::Detected(verdict) => Some(verdict),
+            Self::Missing => Some(Significance::Missing),
+            _ => Some(Significance::NotShown),
+        }
+    }
+
     /// Derives the claim from both parsings of a finding.
     pub(super) fn new(strict: ParsedFinding, lenient: ParsedFinding) -> Self {
         let is_same_direction = strict.gain * lenient.gain > 0.0;
@@ -54,6 +68,8 @@ impl Claim {
             Self::StrictOnly(strict.direction())
         } else if strict.verdict.is_shown() {
             Self::InOwnSet
+        } else if strict.verdict == Significance::Missing {
+            Self::Missing
         } else {
             Self::Open
         }

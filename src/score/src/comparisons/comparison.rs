@@ -10,8 +10,8 @@ use super::paired::PairedComparison;
 use crate::choice::ParsingMode;
 use crate::grid::Grid;
 use crate::model_in_condition::{ModelInCondition, models_under_test};
-use crate::significance::{Significance, least_p};
-use darkqa_ground::types::{AxisLevel, Family, PairDark, Variant, View};
+use crate::significance::{CorrectedP, Significance, least_p};
+use darkqa_ground::types::{AxisLevel, EnhancerName, Family, PairDark, Variant, View};
 use rayon::prelude::*;
 
 /// The two sides of a comparison.
@@ -23,6 +23,8 @@ pub enum ComparisonKind {
     Variant,
     /// Enhanced against raw, at the same level and variant.
     Enhancer,
+    /// One enhancer against another, at the same level and variant.
+    EnhancerPair,
     /// One model against another in the same condition.
     Model,
     /// A model with images against a model without.
@@ -37,10 +39,11 @@ pub enum ComparisonKind {
 
 impl ComparisonKind {
     /// All kinds in the order of the tables.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Level,
         Self::Variant,
         Self::Enhancer,
+        Self::EnhancerPair,
         Self::Model,
         Self::Blind,
         Self::Light,
@@ -55,6 +58,7 @@ impl ComparisonKind {
             Self::Level => "level",
             Self::Variant => "variant",
             Self::Enhancer => "enhancer",
+            Self::EnhancerPair => "enhancers",
             Self::Model => "model",
             Self::Blind => "blind",
             Self::Light => "light",
@@ -128,6 +132,13 @@ impl Comparison {
         Claim::new(strict, lenient)
     }
 
+    /// Verdict in tables, which is that of the sentences; `None` if no sentence is about the comparison.
+    #[must_use]
+    pub fn verdict(&self) -> Option<Significance> {
+        self.claim()
+            .verdict(self.strict.significance, self.strict.p_report)
+    }
+
     /// Comparison in a parsing.
     #[must_use]
     pub fn parsed(&self, mode: ParsingMode) -> &TestedComparison {
@@ -138,15 +149,24 @@ impl Comparison {
     }
 }
 
-/// Maximum number of comparisons between models (chosen); they take at most a gigabyte.
-const MAX_MODEL_COMPARISONS: usize = 500_000;
+/// Maximum number of comparisons between models, and between enhancers (chosen); they take at most a gigabyte each.
+const MAX_COMPARISONS: usize = 500_000;
 
 /// True if models are compared with each other. The number of pairs grows with the square of the number of models, so it is limited.
 #[must_use]
 pub fn compares_models(grid: &Grid<'_>) -> bool {
     let models: BTreeSet<&str> = grid.subjects.iter().map(|s| &*s.model).collect();
     let pairs = grid.subjects.len() * models.len().saturating_sub(1) / 2;
-    pairs.saturating_mul(grid.groups().len()) <= MAX_MODEL_COMPARISONS
+    pairs.saturating_mul(grid.groups().len()) <= MAX_COMPARISONS
+}
+
+/// True if enhancers are compared with each other. The number of pairs grows with the square of the number of enhancers, so it is limited.
+#[must_use]
+pub fn compares_enhancers(grid: &Grid<'_>) -> bool {
+    let enhanced = grid.subjects.iter().filter_map(|s| s.enhancer.as_ref());
+    let enhancers: BTreeSet<&EnhancerName> = enhanced.clone().collect();
+    let pairs = enhanced.count() * enhancers.len().saturating_sub(1) / 2;
+    pairs.saturating_mul(grid.groups().len()) <= MAX_COMPARISONS
 }
 
 /// All comparisons of a grid, ordered by kind, family and subjects.
@@ -233,23 +253,33 @@ fn corrected(mut all: Vec<Comparison>) -> Vec<Comparison> {
     }
     for set in sets.into_values() {
         let own = set.iter().map(|index| &all[*index]);
-        let strict = holm_of(own.clone().map(|found| found.strict.paired.p));
-        let lenient = holm_of(own.clone().map(|found| found.lenient.paired.p));
+        let [strict, lenient] = ParsingMode::ALL.map(|mode| {
+            let paired = own.clone().map(|found| &found.parsed(mode).paired);
+            [
+                holm_of(paired.clone().map(|paired| paired.p)),
+                holm_of(paired.map(|paired| paired.p_if_answered)),
+            ]
+        });
         let least = holm_of(own.map(|found| least_p(found.strict.paired.clusters)));
         for (position, index) in set.into_iter().enumerate() {
             let comparison = &mut all[index];
             let is_too_small = comparison.is_too_small();
             comparison.least_holm = least[position];
-            for (tested, holm) in [
-                (&mut comparison.strict, strict[position]),
-                (&mut comparison.lenient, lenient[position]),
+            for (tested, [holm, if_answered]) in [
+                (&mut comparison.strict, &strict),
+                (&mut comparison.lenient, &lenient),
             ] {
                 let difference = tested.paired.difference.value;
-                tested.holm = holm;
+                tested.holm = holm[position];
+                let corrected = CorrectedP {
+                    p: holm[position],
+                    if_answered: if_answered[position],
+                    least: least[position],
+                };
                 tested.significance = if is_too_small {
                     Significance::TooFew
                 } else {
-                    Significance::new(difference, holm, least[position])
+                    Significance::new(difference, corrected)
                 };
             }
         }
@@ -260,7 +290,7 @@ fn corrected(mut all: Vec<Comparison>) -> Vec<Comparison> {
 /// Indices of the subjects that a kind compares.
 pub(super) fn pairs(grid: &Grid<'_>, kind: ComparisonKind) -> Vec<(usize, usize)> {
     let mut pairs = Vec::new();
-    let compares_models = compares_models(grid);
+    let (compares_models, compares_enhancers) = (compares_models(grid), compares_enhancers(grid));
     let under_test = models_under_test(grid.subjects.iter().map(|subject| &*subject.model));
     for (index, subject) in grid.subjects.iter().enumerate() {
         let against: Vec<usize> = match kind {
@@ -302,6 +332,9 @@ pub(super) fn pairs(grid: &Grid<'_>, kind: ComparisonKind) -> Vec<(usize, usize)
             ComparisonKind::RealSynthetic if subject.variant.photograph().is_some() => {
                 real_synthetic::equally_dark(grid, index)
             }
+            ComparisonKind::EnhancerPair if compares_enhancers && subject.enhancer.is_some() => {
+                later_enhancers(grid, index)
+            }
             ComparisonKind::Model if compares_models => later_models(grid, index, &under_test),
             ComparisonKind::Light => later_lights(grid, index),
             ComparisonKind::Blind if subject.view == Some(View::Image) => blind(grid, subject),
@@ -321,6 +354,22 @@ fn find_changed(
     let mut other = subject.clone();
     change(&mut other);
     grid.find_up_to_group(&other).into_iter().collect()
+}
+
+/// Other enhancers of the same model at the same level and variant, later in the order of names, so that each pair occurs once.
+fn later_enhancers(grid: &Grid<'_>, index: usize) -> Vec<usize> {
+    let subject = &grid.subjects[index];
+    // The subjects of a model are sorted by level, variant and enhancer.
+    grid.subjects
+        .iter()
+        .enumerate()
+        .skip(index + 1)
+        .take_while(|(_, other)| {
+            (&other.model, other.level, &other.variant)
+                == (&subject.model, subject.level, &subject.variant)
+        })
+        .map(|(other, _)| other)
+        .collect()
 }
 
 /// Later models of the grid in the same condition, so that each pair occurs once. Only models in `under_test` are compared.

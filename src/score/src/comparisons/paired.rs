@@ -6,7 +6,7 @@ use crate::grid::{Grid, GridItem};
 use crate::significance::{ALPHA, SwapMethod, mcnemar, swap_test};
 use darkqa_ground::types::Family;
 use darkqa_statistics::quantiles::{degrees_of_freedom, quantile, two_sided_tail};
-use darkqa_statistics::residuals::{residuals, unknown_design_effect};
+use darkqa_statistics::residuals::{residuals, unknown_design_effect, variance_of_few};
 
 /// Comparison of two subjects on the items to which both replied.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,16 +27,12 @@ pub struct PairedComparison {
     pub mcnemar: f64,
     /// p-value of no difference ([`PairedTest`]).
     pub p: f64,
+    /// Smallest p-value that any values of the missing replies could give ([`PairedTest`]).
+    pub p_if_answered: f64,
+    /// Number of items that both subjects were asked, and of which one has no reply.
+    pub missing: usize,
     /// Standard error of the difference, and its degrees of freedom.
     pub spread: Spread,
-}
-
-/// Numbers of pairs in a cluster: all, right only for the first subject, and right only for the second.
-#[derive(Debug, Clone, Copy, Default)]
-struct ClusterPairs {
-    all: u32,
-    gained: u32,
-    lost: u32,
 }
 
 impl PairedComparison {
@@ -75,50 +71,148 @@ impl PairedComparison {
         has: impl Fn(usize, &GridItem<'_>) -> bool,
         counts: impl Fn(&GridItem<'_>, Option<u8>) -> bool,
     ) -> Option<Self> {
-        let mut clusters = vec![ClusterPairs::default(); grid.clusters];
-        let mut counted = [0_usize; 2];
+        let mut sums = BoundedSums::new(grid.clusters);
+        let (mut counted, mut n) = ([0_usize; 2], 0);
+        let (mut gained, mut lost) = (0, 0);
         for (index, item) in grid.items.iter().enumerate() {
             if !has(index, item) {
                 continue;
             }
-            let [a, b] = [first, second].map(|subject| grid.result(subject, index).reading(mode));
-            let (Some(a), Some(b)) = (a, b) else {
-                continue;
-            };
-            let (a, b) = (counts(item, a), counts(item, b));
-            let cluster = &mut clusters[item.cluster as usize];
-            cluster.all += 1;
-            cluster.gained += u32::from(a && !b);
-            cluster.lost += u32::from(b && !a);
-            counted[0] += usize::from(a);
-            counted[1] += usize::from(b);
+            let results = [first, second].map(|subject| grid.result(subject, index));
+            let counts = results.map(|result| {
+                let chosen = result.reading(mode)?;
+                Some(counts(item, chosen))
+            });
+            match counts {
+                [Some(a), Some(b)] => {
+                    n += 1;
+                    gained += usize::from(a && !b);
+                    lost += usize::from(b && !a);
+                    counted[0] += usize::from(a);
+                    counted[1] += usize::from(b);
+                    sums.add(item.cluster, i64::from(a) - i64::from(b));
+                }
+                [None, None] => {}
+                _ if results.iter().all(|result| result.is_asked()) => {
+                    let [lowest, highest] = net_bounds(counts);
+                    sums.add_missing(item.cluster, lowest, highest);
+                }
+                _ => {}
+            }
         }
-        clusters.retain(|cluster| cluster.all > 0);
-        let n: usize = clusters.iter().map(|pairs| pairs.all as usize).sum();
-        if n == 0 {
-            return None;
-        }
-        let gained: usize = clusters.iter().map(|pairs| pairs.gained as usize).sum();
-        let lost: usize = clusters.iter().map(|pairs| pairs.lost as usize).sum();
-        let nets: Vec<ClusterNet> = clusters
-            .iter()
-            .map(|cluster| ClusterNet {
-                net: i64::from(cluster.gained) - i64::from(cluster.lost),
-                items: cluster.all,
-            })
-            .collect();
-        let tested = PairedTest::new(&nets, 1.0, (gained + lost) as f64);
+        let tested = sums.test(1.0)?;
         Some(Self {
             first: counted[0] as f64 / n as f64,
             second: counted[1] as f64 / n as f64,
             difference: tested.difference,
             gained,
             lost,
-            clusters: clusters.len(),
+            clusters: sums.clusters(),
             mcnemar: mcnemar(gained, lost),
             p: tested.p,
+            p_if_answered: tested.p_if_answered,
+            missing: sums.missing.len(),
             spread: tested.spread,
         })
+    }
+}
+
+/// Smallest and largest net difference of two replies of which some are missing: a missing reply may have counted or not.
+pub(super) fn net_bounds(counts: [Option<bool>; 2]) -> [i64; 2] {
+    let [first, second] = counts;
+    let value = |counts: Option<bool>, if_missing: bool| i64::from(counts.unwrap_or(if_missing));
+    [
+        value(first, false) - value(second, true),
+        value(first, true) - value(second, false),
+    ]
+}
+
+/// Differences of the items of a comparison, summed by cluster. Items with missing replies have bounds in place of a difference.
+///
+/// A reply may be missing because of the condition: a model that refuses what it cannot see would otherwise seem to see it. Nothing is
+/// assumed about the missing replies: the bounds are those of Manski 1990 (Am. Econ. Rev. 80:319), here for a difference whose two sides
+/// may lack replies. Items without a reply on either side are left out, because nothing tells the conditions apart there.
+#[derive(Debug, Clone)]
+pub(crate) struct BoundedSums {
+    /// Sums over the items with all replies, by cluster.
+    replied: NetSums,
+    /// Cluster, smallest and largest difference of each item with a missing reply.
+    missing: Vec<(u32, [i64; 2])>,
+}
+
+impl BoundedSums {
+    /// Creates the sums of no item in `clusters` clusters.
+    pub(crate) fn new(clusters: usize) -> Self {
+        Self {
+            replied: NetSums::new(clusters),
+            missing: Vec::new(),
+        }
+    }
+
+    /// Adds an item of a cluster with its difference.
+    pub(crate) fn add(&mut self, cluster: u32, net: i64) {
+        self.replied.add(cluster, net);
+    }
+
+    /// Adds an item of a cluster with the smallest and the largest difference that its missing replies allow.
+    pub(super) fn add_missing(&mut self, cluster: u32, lowest: i64, highest: i64) {
+        self.missing.push((cluster, [lowest, highest]));
+    }
+
+    /// Number of clusters with an item that has all replies.
+    pub(super) fn clusters(&self) -> usize {
+        let clusters = self.replied.clusters.iter();
+        clusters.filter(|cluster| cluster.items > 0).count()
+    }
+
+    /// Tests the mean difference; `scale` is the number of pairs summed in the difference of an item. `None` if no item has all replies.
+    pub(crate) fn test(&self, scale: f64) -> Option<PairedTest> {
+        let replied = self.replied.test(scale)?;
+        if self.missing.is_empty() {
+            return Some(replied);
+        }
+        let [lowest, highest] = [0, 1].map(|side| {
+            let mut sums = self.replied.clone();
+            for (cluster, bounds) in &self.missing {
+                sums.add(*cluster, bounds[side]);
+            }
+            sums.test(scale)
+        });
+        Some(replied.bounded([lowest?, highest?]))
+    }
+}
+
+/// Net differences by cluster, with the sum of the squared differences of all items.
+#[derive(Debug, Clone)]
+struct NetSums {
+    clusters: Vec<ClusterNet>,
+    squares: i64,
+}
+
+impl NetSums {
+    fn new(clusters: usize) -> Self {
+        Self {
+            clusters: vec![ClusterNet { net: 0, items: 0 }; clusters],
+            squares: 0,
+        }
+    }
+
+    fn add(&mut self, cluster: u32, net: i64) {
+        let sum = &mut self.clusters[cluster as usize];
+        sum.net += net;
+        sum.items += 1;
+        self.squares += net * net;
+    }
+
+    /// Tests the mean difference; `None` without items.
+    fn test(&self, scale: f64) -> Option<PairedTest> {
+        let clusters: Vec<ClusterNet> = self
+            .clusters
+            .iter()
+            .copied()
+            .filter(|cluster| cluster.items > 0)
+            .collect();
+        (!clusters.is_empty()).then(|| PairedTest::new(&clusters, scale, self.squares as f64))
     }
 }
 
@@ -136,10 +230,15 @@ pub(crate) struct ClusterNet {
 /// p is the larger of two p-values of no difference: that of Student's t, from which the interval of [`difference`] is computed, and the
 /// exact one of swapping the two sides in whole clusters ([`swap_test`]). The test is therefore valid for any number of clusters. The
 /// interval contains all differences that the test does not reject: if only the swap test does not reject 0, it is extended to 0.
+///
+/// With missing replies ([`BoundedSums`]), the difference is that of the replies, the interval covers those of both bounds, and p is the
+/// largest of the three, or 1 if the bounds differ in sign: a difference is detected only if no values of the missing replies undo it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PairedTest {
     pub(super) difference: Estimate,
     pub(crate) p: f64,
+    /// Smallest p-value of the two bounds; `p` if no reply is missing. If it is small and `p` is not, the missing replies decide.
+    pub(super) p_if_answered: f64,
     /// How the swaps were counted.
     pub(super) by: SwapMethod,
     pub(super) spread: Spread,
@@ -167,8 +266,26 @@ impl PairedTest {
                 extended_to_zero(estimate)
             },
             p,
+            p_if_answered: p,
             by: swapped.by,
             spread,
+        }
+    }
+
+    /// The test with the bounds of its missing replies, the lowest difference first.
+    fn bounded(self, [lowest, highest]: [Self; 2]) -> Self {
+        let has_one_sign = highest.difference.value < 0.0 || lowest.difference.value > 0.0;
+        Self {
+            difference: self
+                .difference
+                .covering([lowest.difference, highest.difference]),
+            p: if has_one_sign {
+                self.p.max(lowest.p).max(highest.p)
+            } else {
+                1.0
+            },
+            p_if_answered: self.p.min(lowest.p).min(highest.p),
+            ..self
         }
     }
 }
@@ -219,9 +336,9 @@ pub const POWER: f64 = 0.8;
 /// Estimates a difference with the interval of Bonett and Price (2012, J. Educ. Behav. Stat. 37:479).
 ///
 /// One pair is added in each direction, so that few or no discordant pairs do not look like certainty. Here the variance between clusters,
-/// which is the sum of their squared [`residuals`], replaces that of independent pairs, and Student's quantile replaces the normal one. If
-/// clusters vary more than independent pairs would, the degrees of freedom are those of their residuals ([`degrees_of_freedom`]), otherwise
-/// the number of clusters minus 1. If all pairs have the same difference, usually 0, the variance of the two added pairs is multiplied by
+/// which is the sum of their squared [`residuals`] ([`variance_of_few`] for few clusters), replaces that of independent pairs, and
+/// Student's quantile replaces the normal one. If clusters vary more than independent pairs would, the degrees of freedom are those of their
+/// residuals ([`degrees_of_freedom`]), otherwise the number of clusters minus 1. If all pairs have the same difference, usually 0, the variance of the two added pairs is multiplied by
 /// [`unknown_design_effect`], because differences that are concentrated in few clusters may all have been missed.
 ///
 /// `clusters` lists, for each cluster, the sum of the differences of its pairs (of scores between 0 and 1) and their number; `squares` is
@@ -249,8 +366,9 @@ fn interval(clusters: &[(f64, f64)], squares: f64, n: usize) -> (Estimate, Sprea
     let value = sum / all;
     let residuals = residuals(clusters, value);
     // A single cluster has an infinite residual, so that the interval is the whole range.
-    let variance: f64 = residuals.iter().map(|residual| residual * residual).sum();
+    let between: f64 = residuals.iter().map(|residual| residual * residual).sum();
     let independent = squares - all * value * value;
+    let variance = variance_of_few(clusters, between, independent, 1.0);
     let added = if independent > all * ROUNDING {
         ADDED
     } else {
@@ -379,7 +497,8 @@ mod tests {
             (clumped.high - clumped.low - 2.0 * half).abs() < 1e-9,
             "{clumped:?}"
         );
-        let half = student(11.0) * f64::sqrt(2.0) / 242.0;
+        // Equal clusters show no variance. The assumed one, 21.6 · (1 + 0.2 · 19), counts for 2 · (1 − 12 / 30) = 1.2 of 12.2 clusters.
+        let half = student(11.0) * f64::sqrt(1.2 * 21.6 * 4.8 / 12.2 + 2.0) / 242.0;
         assert!(
             (spread.high - spread.low - 2.0 * half).abs() < 1e-9,
             "{spread:?}"
@@ -402,11 +521,32 @@ mod tests {
             (4, 0, 0),
         ]);
         assert!(
-            (interval.low + 0.061_251_861_397_6).abs() < 1e-9,
+            (interval.low + 0.081_789_089_647_3).abs() < 1e-9,
             "{interval:?}"
         );
         assert!(
-            (interval.high - 0.236_251_861_397_6).abs() < 1e-9,
+            (interval.high - 0.256_789_089_647_3).abs() < 1e-9,
+            "{interval:?}"
+        );
+    }
+
+    #[test]
+    fn an_interval_of_six_clusters_matches_a_reference() {
+        // Independent implementation with numpy 2 and scipy 1.17.1.
+        let interval = estimate(&[
+            (20, 2, 1),
+            (20, 3, 0),
+            (20, 0, 1),
+            (20, 4, 1),
+            (20, 1, 0),
+            (20, 2, 2),
+        ]);
+        assert!(
+            (interval.low + 0.063_613_940_783_4).abs() < 1e-9,
+            "{interval:?}"
+        );
+        assert!(
+            (interval.high - 0.178_368_039_144).abs() < 1e-9,
             "{interval:?}"
         );
     }

@@ -2,25 +2,32 @@
 //!
 //! The models are fixed: a finding is about these models, not about models in general. The sample consists of items, grouped in clusters.
 
+mod contrast;
 mod finding;
+mod item;
 mod left_out;
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use rayon::prelude::*;
 
+use super::comparison::compares_enhancers;
 use super::holm_of;
-use super::paired::{ClusterNet, PairedTest};
+use super::paired::BoundedSums;
 use super::pooled_kind::PooledKind;
 use crate::accuracies::{Coverage, Lacking, shared};
+use crate::choice::ParsingMode;
 use crate::grid::{Grid, TrialResult};
 use crate::model_in_condition::{ModelInCondition, pooled_models};
-use crate::significance::{Significance, least_p};
+use crate::significance::{CorrectedP, Significance, least_p};
 use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{AxisLevel, EnhancerName, Family, Variant, View};
 
 use finding::is_severe;
+use item::{PooledItem, PooledState, SideCounts};
 
+pub(crate) use contrast::family_contrasts;
+pub use contrast::{ContrastTest, FamilyContrast};
 pub use finding::{PooledDifference, PooledFinding};
 pub use left_out::ModelsLeftOut;
 pub(crate) use left_out::models_left_out;
@@ -44,17 +51,42 @@ fn models<'g>(grid: &'g Grid<'_>, view: View) -> Vec<&'g str> {
         .collect()
 }
 
-/// A kind, variant and enhancer; Holm's correction is applied to each family of such a set.
+/// A kind, variant and enhancers; Holm's correction is applied to each family of such a set, and of all pairs of enhancers together.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 struct PooledSet {
     kind: PooledKind,
     variant: Variant,
     enhancer: Option<EnhancerName>,
+    /// Enhancer of the second side, for two enhancers.
+    against: Option<EnhancerName>,
 }
 
 impl PooledSet {
     /// All sets for which the grid may contain both sides.
     fn all(grid: &Grid<'_>) -> BTreeSet<Self> {
+        let mut sets = Self::of_enhancers_and_raw(grid);
+        if compares_enhancers(grid) {
+            let enhanced: Vec<Self> = sets
+                .iter()
+                .filter(|set| set.enhancer.is_some())
+                .cloned()
+                .collect();
+            // The sets are sorted by variant and enhancer, so those of a variant are neighbours.
+            for of_variant in enhanced.chunk_by(|a, b| a.variant == b.variant) {
+                for (index, first) in of_variant.iter().enumerate() {
+                    sets.extend(of_variant[index + 1..].iter().map(|second| Self {
+                        kind: PooledKind::EnhancerPair,
+                        against: second.enhancer.clone(),
+                        ..first.clone()
+                    }));
+                }
+            }
+        }
+        sets
+    }
+
+    /// All sets but those of two enhancers.
+    fn of_enhancers_and_raw(grid: &Grid<'_>) -> BTreeSet<Self> {
         // Findings are about levels. Image pairs have no level; other comparisons cover them.
         grid.subjects
             .iter()
@@ -68,6 +100,7 @@ impl PooledSet {
                     kind,
                     variant: subject.variant.clone(),
                     enhancer: subject.enhancer.clone(),
+                    against: None,
                 })
             })
             .collect()
@@ -98,6 +131,9 @@ impl PooledSet {
             }
             PooledKind::Enhancer => {
                 ModelInCondition::with_images(model, level, &self.variant, None)
+            }
+            PooledKind::EnhancerPair => {
+                ModelInCondition::with_images(model, level, &self.variant, self.against.as_ref())
             }
             PooledKind::Blind => ModelInCondition::new(other, None),
         };
@@ -194,36 +230,6 @@ struct SetModels<'g> {
     extra_levels: Vec<(&'g str, Vec<AxisLevel>)>,
 }
 
-/// Replies of all models to one item on both sides.
-#[derive(Debug, Clone, Copy)]
-struct PooledItem {
-    /// Index of the item in the grid.
-    index: usize,
-    /// Replies of each side; `None` if a model has no reply.
-    sides: Option<[SideCounts; 2]>,
-}
-
-/// Numbers of replies of all models to one item on one side.
-#[derive(Debug, Clone, Copy, Default)]
-struct SideCounts {
-    /// Counted replies in the strict parsing: right replies, or false answers.
-    strict: u32,
-    /// Counted replies in the lenient parsing.
-    lenient: u32,
-    /// Replies in which the strict parsing finds a choice.
-    read: u32,
-}
-
-impl SideCounts {
-    fn add(self, other: Self) -> Self {
-        Self {
-            strict: self.strict + other.strict,
-            lenient: self.lenient + other.lenient,
-            read: self.read + other.read,
-        }
-    }
-}
-
 /// Returns all pooled findings of single levels, and those averaged over levels, both ordered by kind, variant, enhancer, family and level.
 #[must_use]
 pub fn pooled(grid: &Grid<'_>) -> (Vec<PooledFinding>, Vec<PooledFinding>) {
@@ -232,9 +238,28 @@ pub fn pooled(grid: &Grid<'_>) -> (Vec<PooledFinding>, Vec<PooledFinding>) {
         .into_par_iter()
         .flat_map_iter(|set| set_findings(grid, &set))
         .collect();
-    findings
+    let (mut levels, means): (Vec<PooledFinding>, Vec<PooledFinding>) = findings
         .into_iter()
-        .partition(|finding| finding.mean_over.is_empty())
+        .partition(|finding| finding.mean_over.is_empty());
+    correct_enhancer_pairs(&mut levels);
+    (levels, means)
+}
+
+/// Corrects the findings about two enhancers over all pairs and levels of a variant, for each family.
+fn correct_enhancer_pairs(findings: &mut [PooledFinding]) {
+    let mut sets = BTreeMap::<(Variant, Option<Family>), Vec<usize>>::new();
+    for (index, finding) in findings.iter().enumerate() {
+        if finding.kind == PooledKind::EnhancerPair {
+            let set = (finding.variant.clone(), finding.family.clone());
+            sets.entry(set).or_default().push(index);
+        }
+    }
+    for set in sets.into_values() {
+        let own = set.iter().map(|index| findings[*index].clone()).collect();
+        for (index, finding) in set.into_iter().zip(corrected(own)) {
+            findings[index] = finding;
+        }
+    }
 }
 
 /// Computes the findings of a set averaged over its darker levels, and over its lighter levels, if it has several of them. An effect that
@@ -258,26 +283,27 @@ fn averaged(
             return None;
         }
         let mean_over: Vec<AxisLevel> = half.iter().map(|(level, _)| *level).collect();
-        let mut sums = BTreeMap::<usize, Option<[SideCounts; 2]>>::new();
+        // Sum of each item with its number of levels.
+        let mut sums = BTreeMap::<usize, (PooledItem, usize)>::new();
         for item in half.iter().flat_map(|(_, items)| items) {
-            let sum = sums
-                .entry(item.index)
-                .or_insert_with(|| Some([SideCounts::default(); 2]));
-            *sum = sum.zip(item.sides).map(|(sum, sides)| {
-                let [first, second] = sum;
-                [first.add(sides[0]), second.add(sides[1])]
-            });
+            sums.entry(item.index)
+                .and_modify(|(sum, levels)| {
+                    sum.sides = [0, 1].map(|side| sum.sides[side].add(item.sides[side]));
+                    sum.state = sum.state.and(item.state);
+                    *levels += 1;
+                })
+                .or_insert((*item, 1));
         }
-        // Only items answered at every level count.
-        let mut asked = BTreeMap::<usize, usize>::new();
-        for item in half.iter().flat_map(|(_, items)| items) {
-            *asked.entry(item.index).or_default() += 1;
-        }
+        // Only items asked at every level count.
         let items: Vec<PooledItem> = sums
-            .into_iter()
-            .map(|(index, sides)| PooledItem {
-                index,
-                sides: sides.filter(|_| asked[&index] == half.len()),
+            .into_values()
+            .map(|(item, levels)| PooledItem {
+                state: if levels == half.len() {
+                    item.state
+                } else {
+                    PooledState::Unasked
+                },
+                ..item
             })
             .collect();
         let level = *mean_over.last()?;
@@ -353,23 +379,35 @@ fn items(
         .enumerate()
         .filter(|(_, item)| set.kind.is_about(item))
         .filter_map(|(index, item)| {
-            let (mut sides, mut is_asked, mut is_answered) =
-                ([SideCounts::default(); 2], false, true);
+            let mut sides = [SideCounts::default(); 2];
+            let mut is_asked = false;
+            let mut state = PooledState::Answered;
             for &(first, second) in &pairs {
-                let [a, b] = [first, second].map(|subject| grid.result(subject, index));
-                is_asked |= a.is_asked() && b.is_asked();
-                for (side, result) in sides.iter_mut().zip([a, b]) {
+                let results = [first, second].map(|subject| grid.result(subject, index));
+                let is_asked_on_both = results.iter().all(|result| result.is_asked());
+                is_asked |= is_asked_on_both;
+                let has_reply = results.iter().any(|result| result.is_reply());
+                for (side, result) in sides.iter_mut().zip(results) {
                     let TrialResult::Read { strict, lenient } = result else {
-                        is_answered = false;
+                        side.missing += u32::from(has_reply);
+                        state = state.and(if is_asked_on_both {
+                            PooledState::Missing
+                        } else {
+                            PooledState::Unasked
+                        });
                         continue;
                     };
                     side.strict += u32::from(set.kind.counts(item, strict));
                     side.lenient += u32::from(set.kind.counts(item, lenient));
                     side.read += u32::from(strict.is_some());
+                    side.replies += 1;
                 }
             }
-            let sides = is_answered.then_some(sides);
-            is_asked.then_some(PooledItem { index, sides })
+            is_asked.then_some(PooledItem {
+                index,
+                sides,
+                state,
+            })
         });
     Some(items.collect())
 }
@@ -385,28 +423,26 @@ fn finding(
 ) -> Option<PooledFinding> {
     let models = pool.models;
     let each = models.len() * pool.levels;
-    let (mut answered, mut dropped) = (Vec::new(), 0);
-    for (item, sides) in items
+    let of_family: Vec<(u32, PooledItem)> = items
         .iter()
-        .map(|item| (&grid.items[item.index], item.sides))
+        .map(|item| (&grid.items[item.index], *item))
         .filter(|(item, _)| item.is_in_family(family))
-    {
-        match sides {
-            Some(sides) => answered.push((item.cluster, sides)),
-            None => dropped += 1,
-        }
-    }
-    if answered.is_empty() {
-        return None;
-    }
-    let replies = (each * answered.len()) as f64;
-    let strict = difference(grid, &answered, each, |side| side.strict);
-    let parsings_differ = answered
+        .map(|(item, pooled)| (item.cluster, pooled))
+        .collect();
+    let answered: Vec<(u32, [SideCounts; 2])> = of_family
         .iter()
-        .flat_map(|(_, sides)| sides)
+        .filter(|(_, item)| item.state == PooledState::Answered)
+        .map(|(cluster, item)| (*cluster, item.sides))
+        .collect();
+    let dropped = of_family.len() - answered.len();
+    let replies = (each * answered.len()) as f64;
+    let strict = difference(grid, &of_family, each, |side| side.strict)?;
+    let parsings_differ = of_family
+        .iter()
+        .flat_map(|(_, item)| &item.sides)
         .any(|side| side.strict != side.lenient);
     let lenient = if parsings_differ {
-        difference(grid, &answered, each, |side| side.lenient)
+        difference(grid, &of_family, each, |side| side.lenient)?
     } else {
         strict
     };
@@ -420,6 +456,7 @@ fn finding(
         family: family.cloned(),
         variant: set.variant.clone(),
         enhancer: set.enhancer.clone(),
+        against: set.against.clone(),
         level,
         mean_over: Vec::new(),
         models: names,
@@ -440,6 +477,12 @@ fn finding(
         levels: 1,
         items: answered.len(),
         dropped,
+        missing: of_family
+            .iter()
+            .filter(|(_, item)| {
+                item.state == PooledState::Missing && item.net_bounds(|_| 0).is_some()
+            })
+            .count(),
         clusters: clusters.len(),
         least_p: least_p(clusters.len()),
         least_holm: 1.0,
@@ -447,57 +490,72 @@ fn finding(
 }
 
 /// Computes the difference of the counted replies, before correction; `counted` gives their number, `each` is the number of replies to an
-/// item on each side.
+/// item on each side. `None` if no item is answered.
 fn difference(
     grid: &Grid<'_>,
-    answered: &[(u32, [SideCounts; 2])],
+    items: &[(u32, PooledItem)],
     each: usize,
     counted: impl Fn(&SideCounts) -> u32,
-) -> PooledDifference {
-    let mut clusters = vec![ClusterNet { net: 0, items: 0 }; grid.clusters];
-    let (mut sums, mut squares) = ([0_u64; 2], 0);
-    for (cluster, sides) in answered {
-        let [first, second] = [&sides[0], &sides[1]].map(&counted);
-        let net = i64::from(first) - i64::from(second);
-        let of_cluster = &mut clusters[*cluster as usize];
-        of_cluster.net += net;
-        of_cluster.items += 1;
-        squares += net * net;
-        sums[0] += u64::from(first);
-        sums[1] += u64::from(second);
+) -> Option<PooledDifference> {
+    let mut nets = BoundedSums::new(grid.clusters);
+    let (mut sums, mut answered) = ([0_u64; 2], 0);
+    for (cluster, item) in items {
+        let Some([lowest, highest]) = item.net_bounds(&counted) else {
+            continue;
+        };
+        if item.state == PooledState::Answered {
+            nets.add(*cluster, lowest);
+            answered += 1;
+            for (sum, side) in sums.iter_mut().zip(&item.sides) {
+                *sum += u64::from(counted(side));
+            }
+        } else {
+            nets.add_missing(*cluster, lowest, highest);
+        }
     }
-    clusters.retain(|cluster| cluster.items > 0);
-    let tested = PairedTest::new(&clusters, each as f64, squares as f64);
-    let [first, second] = sums.map(|count| count as f64 / each as f64 / answered.len() as f64);
-    PooledDifference {
+    let tested = nets.test(each as f64)?;
+    let [first, second] = sums.map(|count| count as f64 / each as f64 / f64::from(answered));
+    Some(PooledDifference {
         first,
         second,
         difference: tested.difference,
         p: tested.p,
+        p_if_answered: tested.p_if_answered,
         p_by: tested.by,
         holm: 1.0,
         verdict: Significance::NotShown,
         p_report: None,
-    }
+    })
 }
 
 /// Fills in the verdicts of the findings of one set, after Holm's correction.
 fn corrected(mut set: Vec<PooledFinding>) -> Vec<PooledFinding> {
     let least = holm_of(set.iter().map(|finding| finding.least_p));
-    let strict = holm_of(set.iter().map(|finding| finding.strict.p));
-    let lenient = holm_of(set.iter().map(|finding| finding.lenient.p));
+    let [strict, lenient] = ParsingMode::ALL.map(|mode| {
+        [
+            holm_of(set.iter().map(|finding| finding.parsed(mode).p)),
+            holm_of(set.iter().map(|finding| finding.parsed(mode).p_if_answered)),
+        ]
+    });
     let levels = set.len();
     for (index, finding) in set.iter_mut().enumerate() {
         finding.levels = levels;
         finding.least_holm = least[index];
         let kind = finding.kind;
-        for (parsed, holm) in [
-            (&mut finding.strict, strict[index]),
-            (&mut finding.lenient, lenient[index]),
+        for (parsed, [holm, if_answered]) in [
+            (&mut finding.strict, &strict),
+            (&mut finding.lenient, &lenient),
         ] {
-            parsed.holm = holm;
+            parsed.holm = holm[index];
             let gain = kind.gain(parsed.difference.value);
-            parsed.verdict = Significance::new(gain, holm, least[index]);
+            parsed.verdict = Significance::new(
+                gain,
+                CorrectedP {
+                    p: holm[index],
+                    if_answered: if_answered[index],
+                    least: least[index],
+                },
+            );
         }
     }
     set

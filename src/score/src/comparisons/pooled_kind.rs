@@ -15,6 +15,8 @@ pub enum PooledKind {
     Noise,
     /// Enhanced images against raw ones, at the same level and variant.
     Enhancer,
+    /// Images of one enhancer against those of another, at the same level and variant.
+    EnhancerPair,
     /// Raw images against no image.
     Blind,
     /// False answers to presence questions: a degraded level against L0, without an enhancer.
@@ -44,6 +46,7 @@ impl PooledKind {
             Self::Darkness => "darkness",
             Self::Noise => "noise",
             Self::Enhancer => "enhancer",
+            Self::EnhancerPair => "enhancers",
             Self::Blind => "blind",
             Self::Hallucination(FalseAnswer::No) => "answers no to what is there",
             Self::Hallucination(FalseAnswer::Yes) => "answers yes to what is not there",

@@ -38,7 +38,7 @@ pub fn rank_ranges(best: &BestInTheDark) -> Vec<RankRange> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::best::{DarkAccuracy, DarkPair};
+    use super::super::best::{DarkAccuracy, DarkGain, DarkPair};
     use super::*;
     use crate::estimate::Estimate;
     use crate::significance::SwapMethod;
@@ -64,6 +64,7 @@ mod tests {
             second: (*second).to_owned(),
             difference: share,
             p: 0.01,
+            p_if_answered: 0.01,
             p_by: SwapMethod::Counted,
             holm: 0.01,
             significance: *significance,
@@ -72,6 +73,12 @@ mod tests {
             variant: Variant::NONE,
             levels: Vec::new(),
             lighter: Vec::new(),
+            gain: DarkGain {
+                is_against_blind: false,
+                difference: share,
+                p: 1.0,
+                p_report: None,
+            },
             crossing: None,
             p_report: None,
             asked: Vec::new(),

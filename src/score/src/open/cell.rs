@@ -28,7 +28,8 @@ pub struct OpenCell {
     pub null: usize,
     /// Number of answers that the protocol shortened before they were judged.
     pub cut: usize,
-    /// Mean score, between 0 and 1; `None` if no answer is scored. Its `n` is the number of answers.
+    /// Mean score, between 0 and 1; `None` if no answer is scored. Its `n` is the number of scored answers; its interval holds for all scores
+    /// of the others.
     pub score: Option<Estimate>,
 }
 
@@ -53,15 +54,29 @@ pub(super) fn cell(
             .filter(|answer| answer.outcome == outcome)
             .count()
     };
-    let mut sums = BTreeMap::<usize, (f64, f64)>::new();
-    for answer in answers {
-        if let Some(points) = answer.outcome.points() {
-            let (sum, n) = sums.entry(clusters[answer.question]).or_default();
-            (*sum, *n) = (*sum + points, *n + 1.0);
+    // Sums of the scores by cluster, with a value in place of a missing score.
+    let sums = |if_missing: Option<f64>| -> Vec<(f64, f64)> {
+        let mut sums = BTreeMap::<usize, (f64, f64)>::new();
+        for answer in answers {
+            if let Some(points) = answer.outcome.points().or(if_missing) {
+                let (sum, n) = sums.entry(clusters[answer.question]).or_default();
+                (*sum, *n) = (*sum + points, *n + 1.0);
+            }
         }
-    }
-    let sums: Vec<(f64, f64)> = sums.into_values().collect();
-    let n = sums.iter().map(|(_, n)| n).sum::<f64>() as usize;
+        sums.into_values().collect()
+    };
+    let n = answers
+        .iter()
+        .filter(|answer| answer.outcome.points().is_some())
+        .count();
+    let score = Estimate::from_scores(&sums(None), MAX_WEIGHT, n);
+    let score = if n < answers.len() {
+        let bounds =
+            [0.0, 1.0].map(|points| Estimate::from_scores(&sums(Some(points)), MAX_WEIGHT, n));
+        score.map(|score| score.covering(bounds.into_iter().flatten()))
+    } else {
+        score
+    };
     OpenCell {
         subject: subject.clone(),
         group: group.clone(),
@@ -71,6 +86,6 @@ pub(super) fn cell(
         unmarked: count(AnswerOutcome::Unmarked),
         null: count(AnswerOutcome::Null),
         cut: answers.iter().filter(|answer| answer.cut).count(),
-        score: Estimate::from_scores(&sums, MAX_WEIGHT, n),
+        score,
     }
 }

@@ -49,7 +49,8 @@ pub(super) fn baselines(subject: &ModelInCondition) -> Vec<(Baseline, ModelInCon
 }
 
 /// Mean of the first answers minus mean of the second, on the questions for which both have a score. Several answers to one question, by
-/// different people, count as their mean.
+/// different people, count as their mean. The interval holds for all scores of answers without one, on the questions with a score on
+/// either side.
 pub(super) fn change(
     first: &[&ScoredAnswer],
     second: &[&ScoredAnswer],
@@ -57,27 +58,77 @@ pub(super) fn change(
     clusters: &[usize],
 ) -> Option<Estimate> {
     let [first, second] = [first, second].map(|answers| {
-        let mut means = BTreeMap::<usize, (f64, f64)>::new();
+        let mut means = BTreeMap::<usize, AnswerScores>::new();
         for answer in answers.iter().filter(|answer| in_group(answer.question)) {
-            if let Some(points) = answer.outcome.points() {
-                let (sum, n) = means.entry(answer.question).or_default();
-                (*sum, *n) = (*sum + points, *n + 1.0);
-            }
+            means.entry(answer.question).or_default().add(answer);
         }
         means
     });
-    let mut sums = BTreeMap::<usize, (f64, f64)>::new();
-    let (mut squares, mut n) = (0.0, 0);
-    for (question, (sum, count)) in &first {
-        let Some((other, others)) = second.get(question) else {
-            continue;
-        };
-        let (net, pairs) = sums.entry(clusters[*question]).or_default();
-        let change = sum / count - other / others;
-        (*net, *pairs) = (*net + change, *pairs + 1.0);
-        squares += change * change;
-        n += 1;
+    let mut changes = Vec::new();
+    for (question, scores) in &first {
+        if let Some(others) = second.get(question) {
+            changes.push((clusters[*question], [scores, others]));
+        }
     }
-    let sums: Vec<(f64, f64)> = sums.into_values().collect();
-    (n > 0).then(|| difference(&sums, squares, n))
+    let estimate = |value: &dyn Fn([&AnswerScores; 2]) -> Option<f64>| {
+        let mut sums = BTreeMap::<usize, (f64, f64)>::new();
+        let (mut squares, mut n) = (0.0, 0);
+        for (cluster, sides) in &changes {
+            let Some(change) = value(*sides) else {
+                continue;
+            };
+            let (net, pairs) = sums.entry(*cluster).or_default();
+            (*net, *pairs) = (*net + change, *pairs + 1.0);
+            squares += change * change;
+            n += 1;
+        }
+        let sums: Vec<(f64, f64)> = sums.into_values().collect();
+        (n > 0).then(|| difference(&sums, squares, n))
+    };
+    let scored = estimate(&|[first, second]| Some(first.mean()? - second.mean()?))?;
+    if changes
+        .iter()
+        .all(|(_, sides)| sides.iter().all(|side| side.missing == 0))
+    {
+        return Some(scored);
+    }
+    let bounds = [(0.0, 1.0), (1.0, 0.0)].map(|(first_points, second_points)| {
+        estimate(&|[first, second]| {
+            let has_score = first.mean().or(second.mean()).is_some();
+            has_score.then(|| first.filled(first_points) - second.filled(second_points))
+        })
+    });
+    Some(scored.covering(bounds.into_iter().flatten()))
+}
+
+/// Scores of the answers to one question.
+#[derive(Debug, Clone, Copy, Default)]
+struct AnswerScores {
+    sum: f64,
+    scored: usize,
+    /// Number of answers without a score.
+    missing: usize,
+}
+
+impl AnswerScores {
+    fn add(&mut self, answer: &ScoredAnswer) {
+        match answer.outcome.points() {
+            Some(points) => {
+                self.sum += points;
+                self.scored += 1;
+            }
+            None => self.missing += 1,
+        }
+    }
+
+    /// Mean score; `None` without a score.
+    fn mean(&self) -> Option<f64> {
+        (self.scored > 0).then(|| self.sum / self.scored as f64)
+    }
+
+    /// Mean score if each answer without a score has this one.
+    fn filled(&self, points: f64) -> f64 {
+        let all = (self.scored + self.missing) as f64;
+        (self.sum + points * self.missing as f64) / all
+    }
 }

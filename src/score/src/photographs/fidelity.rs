@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use crate::choice::ParsingMode;
 use crate::grid::Grid;
 use crate::model_in_condition::{ModelInCondition, pooled_models};
-use crate::significance::{Significance, holm};
+use crate::significance::holm;
 use darkqa_ground::types::{
     AxisLevel, Digest, EnhancerName, Family, FrameId, ImageFidelity, Variant, View,
 };
@@ -50,14 +50,12 @@ pub struct ConditionFidelity {
     pub predicts: [Option<Prediction>; 2],
 }
 
-/// An AUC with its verdict after Holm's correction over the conditions.
+/// An AUC with its p-value after Holm's correction over the conditions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Prediction {
     pub auc: Auc,
     /// p-value after Holm's correction over all conditions.
     pub holm: f64,
-    /// `Better` if higher fidelity is associated with right answers, `Worse` if with wrong answers.
-    pub significance: Significance,
 }
 
 /// PSNR and SSIM of images.
@@ -209,11 +207,7 @@ impl<'a> ConditionSums<'a> {
             replies: self.replies,
             predicts: [0, 1].map(|index| {
                 let auc = self.pairs[index].auc()?;
-                Some(Prediction {
-                    auc,
-                    holm: auc.p,
-                    significance: Significance::NotShown,
-                })
+                Some(Prediction { auc, holm: auc.p })
             }),
         })
     }
@@ -239,8 +233,6 @@ fn correct(rows: &mut [ConditionFidelity]) {
             .collect();
         for (prediction, holm) in predictions.iter_mut().zip(holm(&values)) {
             prediction.holm = holm;
-            prediction.significance =
-                Significance::new(prediction.auc.estimate.value - 0.5, holm, 0.0);
         }
     }
 }

@@ -34,7 +34,7 @@ fn folder_controls_detached_run() {
     stdout:
     part-1-m-001.jsonl: 4 requests to m, batch_1, completed: 4 answered, 0 not
     m · 4 questions · 1 frame · 4 replies, 0 failed · intervals by question
-    ! Only 4 questions (8 are needed): intervals and tests are rough.
+    ! Only 4 questions (8 are needed): wide intervals, few possible verdicts.
 
      accuracy in %
      without images: m 100.0 [51.0, 100.0] · chance 33.3
@@ -56,10 +56,10 @@ fn folder_controls_detached_run() {
     ! run: incomplete: 1 of 4 trials answered, 3 failed. The same command asks the
       rest.
     ! 3 trials of m failed and are not scored: no whole reply in time.
-    ! Only 4 questions (8 are needed): intervals and tests are rough.
+    ! Only 4 questions (8 are needed): wide intervals, few possible verdicts.
 
      accuracy in %
-     without images: m 100.0 [20.7, 100.0] · chance 33.3
+     without images: m 100.0 [4.6, 100.0] · chance 33.3
     run: run
     report: run/report.html
     ");

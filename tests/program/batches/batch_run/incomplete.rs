@@ -66,7 +66,7 @@ fn file_of_servers_page_ends_wait() {
     stdout:
     replies: 1 imported, 0 failed
     m · 4 questions · 1 frame · 4 replies, 0 failed · intervals by question
-    ! Only 4 questions (8 are needed): intervals and tests are rough.
+    ! Only 4 questions (8 are needed): wide intervals, few possible verdicts.
 
      accuracy in %
      without images: m 100.0 [51.0, 100.0] · chance 33.3

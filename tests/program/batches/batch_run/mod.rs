@@ -203,7 +203,7 @@ fn answers_and_marks_use_batches() {
     let called = house.call(&model_args(&base, more));
     insta::assert_snapshot!(called.lines_with("75.0"), @"
     exit code: 0
-     m       with noise   75.0   75.0 (0.0)   6 of 6   −28.2 +16.1
+     m       with noise   75.0   75.0 (0.0)   6 of 6   −72.1 +24.7
      m       with noise   hm3d-v0                 75.0   75.0 (0.0)   −57.6 +22.7
                           scannet-v0              75.0   75.0 (0.0)   −63.2 +23.5
                           attribute recognition   75.0   75.0 (0.0)   −63.2 +23.5

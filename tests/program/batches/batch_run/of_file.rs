@@ -167,7 +167,7 @@ fn vendor_refusing_batches_stops_its_models() {
     ! run: stopped: 4 of 8 trials answered, 4 failed. The same command asks the
       rest.
     ! 4 trials of m failed and are not scored: no whole reply in time.
-    ! Only 4 questions (8 are needed): intervals and tests are rough.
+    ! Only 4 questions (8 are needed): wide intervals, few possible verdicts.
 
      accuracy in %
      without images: n 100.0 [51.0, 100.0] · chance 33.3

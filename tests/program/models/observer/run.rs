@@ -134,10 +134,11 @@ fn single_scene_control_shuffles_tiles() {
     let stdout = called.stdout.split_whitespace().collect::<Vec<_>>();
     insta::assert_snapshot!(redacted(&stdout.join(" ")), @"
     observer · 8 questions · 2 frames · 8 replies, 0 failed · intervals by frame ! Only 2 frames (8 are needed):
-        intervals and tests are rough. accuracy in % observer L0 95 % untouched 100.0 −97.0 0.0 95 %: how far the
-        widest interval of the row reaches down and up chance 33.4 observer: known-signal observer, given the
-        untouched frame; not a model. Control: the same observer, shown the tiles of the right images in another
-        order, scores 33.4 [2.0, 92.4]; chance is 33.4 run: run report: run/report.html
+        wide intervals, few possible verdicts. ! All 2 frames are of one scene and count as independent: the
+        results are about this scene alone. Take more scenes. accuracy in % observer L0 95 % untouched 100.0 −97.0
+        0.0 95 %: how far the widest interval of the row reaches down and up chance 33.4 observer: known-signal
+        observer, given the untouched frame; not a model. Control: the same observer, shown the tiles of the right
+        images in another order, scores 33.4 [0.8, 96.9]; chance is 33.4 run: run report: run/report.html
     ");
     // Without the control, the observer is not shown.
     let path = bench.path("run/records.jsonl");
@@ -151,7 +152,9 @@ fn single_scene_control_shuffles_tiles() {
     exit code: 0
     stdout:
      · 0 questions · 0 frames · 0 replies, 0 failed · intervals by frame
-    ! Only 2 frames (8 are needed): intervals and tests are rough.
+    ! Only 2 frames (8 are needed): wide intervals, few possible verdicts.
+    ! All 2 frames are of one scene and count as independent: the results are about this scene alone. Take more
+        scenes.
     ! the observer is not shown: none of its controls has a reply, so that it guesses without the right image is
         not shown (observer.csv has all numbers)
 
@@ -242,7 +245,7 @@ fn biased_control_hides_observer() {
     assert_eq!(rows.count(), 0, "{called:?}");
     insta::assert_snapshot!(called.lines_with("random"), @"
     exit code: 0
-    random · 22 questions · 6 frames · 66 replies, 0 failed · intervals by frame
+    random · 22 questions · 6 frames · 66 replies, 0 failed · intervals by scene
      random           L0     L3   95 %
     ");
     for file in ["tables.tex", "figures/accuracy.svg"] {

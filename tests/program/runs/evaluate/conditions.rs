@@ -63,7 +63,7 @@ fn every_condition_runs_raw_and_enhanced() {
     );
     let table = bench.complete(&args);
     insta::assert_snapshot!(lines_with(&table, "with noise"), @"
-    with noise            0.0   33.3   66.7   66.7   33.3   33.3   −45.9 +98.4
+    with noise            0.0   33.3   66.7   66.7   33.3   33.3   −65.4 +98.4
     with noise + bright         33.3   66.7    0.0   33.3   33.3   −65.4 +98.4
     with noise + curve          33.3   66.7   33.3   66.7   33.3   −65.4 +65.4
     ");

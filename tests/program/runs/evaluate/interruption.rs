@@ -71,7 +71,7 @@ fn interrupt_abandons_requests_after_grace() {
     m · 1 question · 1 frame · 1 reply, 0 failed · intervals by question
     ! run: cancelled: 1 of 3 trials answered, 0 failed. The same command asks the
       rest.
-    ! Only 1 question (8 are needed): intervals and tests are rough.
+    ! Only 1 question (8 are needed): wide intervals, few possible verdicts.
 
      accuracy in %
      m            L0   95 %
@@ -102,7 +102,7 @@ fn interrupt_does_not_wait_for_retries() {
     m · 1 question · 1 frame · 1 reply, 0 failed · intervals by question
     ! run: cancelled: 1 of 3 trials answered, 0 failed. The same command asks the
       rest.
-    ! Only 1 question (8 are needed): intervals and tests are rough.
+    ! Only 1 question (8 are needed): wide intervals, few possible verdicts.
 
      accuracy in %
      m            L0   95 %

@@ -19,7 +19,7 @@ fn record_and_row_keep_contract() {
     ));
     insta::assert_snapshot!(
         lines_with(&table, "(66.7)"),
-        @"script:script.jsonl   untouched       33.3 (66.7)          3      2 (0)        0   −27.2 +45.9"
+        @"script:script.jsonl   untouched       33.3 (66.7)          3      2 (0)        0   −33.1 +65.4"
     );
     let records = records(&bench.path("run"));
     let record = records

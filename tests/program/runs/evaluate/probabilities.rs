@@ -201,7 +201,7 @@ fn the_report_sets_confidence_against_accuracy() {
     let printed = bench.complete(&model_args(&mock.base_url(), ASKED));
     insta::assert_snapshot!(redacted(&printed), @"
     m · 3 questions · 1 frame · 3 replies, 0 failed · intervals by question
-    ! Only 3 questions (8 are needed): intervals and tests are rough.
+    ! Only 3 questions (8 are needed): wide intervals, few possible verdicts.
     ! The confidence of m is not available: its server states no probabilities of
       tokens, or its replies do not begin with a choice.
 

@@ -67,7 +67,7 @@ fn batch_replies_are_imported_on_resume() {
     let called = house.call(&args);
     insta::assert_snapshot!(called.lines_with("75.0"), @"
     exit code: 0
-     m       with noise   75.0   75.0 (0.0)   6 of 6   −28.2 +16.1
+     m       with noise   75.0   75.0 (0.0)   6 of 6   −72.1 +24.7
      m       with noise   hm3d-v0                 75.0   75.0 (0.0)   −57.6 +22.7
                           scannet-v0              75.0   75.0 (0.0)   −63.2 +23.5
                           attribute recognition   75.0   75.0 (0.0)   −63.2 +23.5

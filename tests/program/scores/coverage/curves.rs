@@ -70,12 +70,18 @@ fn level_counts(random: &mut StdRng, design: &Design) -> LevelCounts {
     LevelCounts {
         levels: levels(),
         counts,
+        missing: vec![Vec::new(); 6],
         guesses,
+        missing_guesses: Vec::new(),
     }
 }
 
 /// The area and the threshold of one run.
-fn curve_of(random: &mut StdRng, design: &Design, draws: &Resamples) -> [Option<bool>; 2] {
+pub(super) fn curve_of(
+    random: &mut StdRng,
+    design: &Design,
+    draws: &Resamples,
+) -> [Option<bool>; 2] {
     let Some(summary) = level_counts(random, design).summary(draws) else {
         return [None; 2];
     };

@@ -20,6 +20,7 @@ use rayon::prelude::*;
 mod auc;
 mod curves;
 mod differences;
+mod few;
 mod pooled;
 mod shares;
 mod unequal;
@@ -31,6 +32,8 @@ enum Shape {
     Even,
     /// A third of all in one cluster, and as many in each of the others.
     Third,
+    /// Nine tenths of all in one cluster, and as many in each of the others.
+    Most,
     /// Log-normal numbers, at least 1, with this standard deviation of their logarithm; drawn for each run.
     LogNormal(f64),
 }
@@ -66,9 +69,14 @@ impl Design {
         let mean = f64::from(self.size);
         match self.shape {
             Shape::Even => vec![self.size; self.clusters],
-            Shape::Third => {
-                let large = (self.clusters as f64 * mean / 3.0).round();
-                let others = 2.0 * large / (self.clusters - 1) as f64;
+            Shape::Third | Shape::Most => {
+                let share = if self.shape == Shape::Most {
+                    0.9
+                } else {
+                    1.0 / 3.0
+                };
+                let large = (self.clusters as f64 * mean * share).round();
+                let others = (1.0 / share - 1.0) * large / (self.clusters - 1) as f64;
                 let mut sizes = vec![others.round().max(1.0) as u32; self.clusters];
                 sizes[0] = large as u32;
                 sizes
@@ -98,6 +106,7 @@ impl Design {
         let shape = match self.shape {
             Shape::Even => 0,
             Shape::Third => 1,
+            Shape::Most => 1 << 9,
             Shape::LogNormal(spread) => 2 + (100.0 * spread) as u64,
         };
         shape << 50

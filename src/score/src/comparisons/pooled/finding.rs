@@ -19,11 +19,13 @@ pub struct PooledFinding {
     pub variant: Variant,
     /// Enhancer of the first side; `None` for raw images.
     pub enhancer: Option<EnhancerName>,
+    /// Enhancer of the second side; `None` except for two enhancers.
+    pub against: Option<EnhancerName>,
     /// Level of the first side; the darkest level for a mean over several.
     pub level: AxisLevel,
     /// All levels of a mean over several, sorted; empty for one level.
     pub mean_over: Vec<AxisLevel>,
-    /// Models, sorted; the same for all findings of one set (kind, variant and enhancer).
+    /// Models, sorted; the same for all findings of one set (kind, variant and enhancers).
     pub models: Vec<String>,
     /// Models without images on the second side, sorted; empty for other kinds of findings. The same as `models` if these were also asked
     /// without images.
@@ -40,6 +42,9 @@ pub struct PooledFinding {
     pub items: usize,
     /// Number of items that some model was asked on both sides, left out because a model has no reply.
     pub dropped: usize,
+    /// Number of items that every model was asked on both sides, and of which a reply is missing on one side only. The intervals and
+    /// verdicts hold for all values of the missing replies.
+    pub missing: usize,
     /// Number of clusters of the items.
     pub clusters: usize,
     /// Smallest p-value that this number of clusters, c, allows: 2 / 2ᶜ.
@@ -59,6 +64,8 @@ pub struct PooledDifference {
     pub difference: Estimate,
     /// p-value of no difference, for all models at once: the larger one of Student's t and of swapping the two sides in whole clusters.
     pub p: f64,
+    /// Smallest p-value that any values of the missing replies could give; `p` if no reply is missing.
+    pub p_if_answered: f64,
     /// How the swaps were counted.
     pub p_by: SwapMethod,
     /// p-value after Holm's correction over the levels of its set: the same kind, variant, enhancer and family.
@@ -85,6 +92,13 @@ impl PooledFinding {
             p_report: parsed.p_report,
         });
         Claim::new(strict, lenient)
+    }
+
+    /// Verdict in tables and figures, which is that of the sentences; `None` if no sentence is about the finding.
+    #[must_use]
+    pub fn verdict(&self) -> Option<Significance> {
+        self.claim()
+            .verdict(self.strict.verdict, self.strict.p_report)
     }
 
     /// True if the level, or every level of a mean, is in the darker part of the ladder: L4 (7.5 EV) and darker, or for another kind of

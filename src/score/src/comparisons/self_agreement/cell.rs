@@ -25,7 +25,7 @@ pub struct AgreementCell {
     /// Parsing of the replies.
     pub mode: ParsingMode,
     /// Share of the replies with the same answer as at L0, over questions with an answer at L0. An unreadable reply counts as a
-    /// disagreement. `None` without a reply.
+    /// disagreement. Its interval holds for all values of the missing replies. `None` without a reply.
     pub agreement: Option<Estimate>,
     /// Agreement on the informative questions only.
     pub informative: Option<Estimate>,
@@ -108,10 +108,11 @@ pub(super) fn cells(
                 mode,
             };
             let mut cell = part.cell(bank, &counts);
-            cell.informative = Estimate::clustered(&informative_grid.counts(subject, family, mode));
+            cell.informative = informative_grid.accuracy(subject, family, mode);
             if cell.role() == CellRole::Other {
                 let bounds = Bounds::new(grid, &cell.subject, family, mode, draws);
-                let share = bounds.map(|bounds| evidence(&counts, &bounds, draws));
+                let failed = grid.failed(subject, family);
+                let share = bounds.map(|bounds| evidence(&counts, &failed, &bounds, draws));
                 cell.evidence = share.transpose();
             }
             cells.push(cell);
@@ -134,7 +135,7 @@ impl CellItems<'_, '_> {
     /// Computes the cell, except the fields that depend on other cells.
     fn cell(&self, bank: &BankIndex<'_>, counts: &[ClusterCount]) -> AgreementCell {
         let (grid, subject, mode) = (self.grid, self.subject, self.mode);
-        let agreement = Estimate::clustered(counts);
+        let agreement = Estimate::with_missing(counts, &grid.failed(subject, self.family));
         let answers = BankCounts::new(grid, subject, self.family, mode, bank);
         let items = grid.family_items(subject, self.family);
         let failed = items.filter(|(_, result)| *result == TrialResult::Failed);

@@ -4,8 +4,8 @@
 use crate::accuracies::CurvePoints;
 use crate::bootstrap::Resamples;
 use crate::choice::ParsingMode;
-use crate::estimate::ClusterCount;
-use crate::estimate::Estimate;
+use crate::comparisons::paired::difference;
+use crate::estimate::{ClusterCount, Estimate, fill_missing};
 use crate::grid::Grid;
 use crate::model_in_condition::ModelInCondition;
 use crate::threshold::{LevelCounts, NoThreshold, Threshold};
@@ -109,8 +109,28 @@ fn position(here: f64, floor: f64, ceiling: f64) -> f64 {
 }
 
 /// Estimates the position of the agreement G of a condition between the floor B and the ceiling C: (G − B) / (C − B), with the interval of
-/// the cluster bootstrap. It may be outside 0 to 1. `None` without replies in the condition.
+/// the cluster bootstrap. It may be outside 0 to 1. `missing` is the number of missing replies of each cluster in the condition, and the
+/// interval holds for all values of them. `None` without replies in the condition.
+///
+/// If all clusters agree as often as at the floor, or as at the ceiling, all draws are equal. That is no certainty, so the interval is then
+/// that of the difference between the two agreements, divided by the distance C − B.
 pub(super) fn evidence(
+    counts: &[ClusterCount],
+    missing: &[u32],
+    bounds: &Bounds,
+    draws: &Resamples,
+) -> Option<Estimate> {
+    let estimate = evidence_of_replies(counts, bounds, draws)?;
+    if missing.iter().all(|missing| *missing == 0) {
+        return Some(estimate);
+    }
+    let others = [false, true].map(|are_right| {
+        evidence_of_replies(&fill_missing(counts, missing, are_right), bounds, draws)
+    });
+    Some(estimate.covering(others.into_iter().flatten()))
+}
+
+fn evidence_of_replies(
     counts: &[ClusterCount],
     bounds: &Bounds,
     draws: &Resamples,
@@ -124,7 +144,36 @@ pub(super) fn evidence(
         .filter(|value| !value.is_nan())
         .collect();
     let replies = counts.iter().map(|count| count.replies as usize).sum();
-    Some(Estimate::around(value, draws.interval(drawn), replies))
+    let [low, high] = draws.interval(drawn);
+    let ends = if low < high {
+        [low, high]
+    } else {
+        let nearest = if value < 0.5 {
+            &bounds.blind
+        } else {
+            &bounds.again
+        };
+        let distance = share(&bounds.again)? - share(&bounds.blind)?;
+        let difference = cluster_difference(counts, nearest);
+        [difference.low, difference.high].map(|end| value + (end - difference.value) / distance)
+    };
+    Some(Estimate::around(value, ends, replies))
+}
+
+/// Difference of the agreements of two conditions on the same items, with its interval by cluster.
+fn cluster_difference(first: &[ClusterCount], second: &[ClusterCount]) -> Estimate {
+    let clusters: Vec<(f64, f64)> = first
+        .iter()
+        .zip(second)
+        .filter(|(first, second)| first.replies.min(second.replies) > 0)
+        .map(|(first, second)| {
+            let net = f64::from(first.right) - f64::from(second.right);
+            (net, f64::from(first.replies.min(second.replies)))
+        })
+        .collect();
+    let squares = clusters.iter().map(|(net, _)| net.abs()).sum();
+    let n = clusters.iter().map(|(_, items)| *items as usize).sum();
+    difference(&clusters, squares, n)
 }
 
 /// Reason why the exposure drop at which half of the evidence is lost is unknown.
@@ -162,12 +211,22 @@ pub(super) fn curves(grid: &Grid<'_>, draws: &Resamples) -> Vec<EvidenceCurve> {
                 Err(reason) => Err(NoHalf::NoEvidence(reason)),
                 Ok(bounds) => {
                     let subjects = points.subjects.iter();
+                    let missing: Vec<Vec<u32>> = subjects
+                        .clone()
+                        .map(|(_, subject)| grid.failed(*subject, None))
+                        .collect();
+                    let floor_share = share(&bounds.blind).unwrap_or(0.0);
                     let counts = LevelCounts {
                         levels: subjects.clone().map(|(level, _)| *level).collect(),
                         counts: subjects
                             .map(|(_, subject)| grid.counts(*subject, None, mode))
                             .collect(),
                         guesses: floor(&bounds),
+                        missing_guesses: missing[0]
+                            .iter()
+                            .map(|missing| (f64::from(*missing) * floor_share) as f32)
+                            .collect(),
+                        missing,
                     };
                     let summary = counts.summary(draws)?;
                     summary.threshold.map_err(NoHalf::Curve)
@@ -198,4 +257,37 @@ fn floor(bounds: &Bounds) -> Vec<f32> {
         .iter()
         .map(|count| (f64::from(count.right) * scale) as f32)
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equal_draws_are_no_certainty() {
+        let draws = Resamples::new(10);
+        let counts = |right| vec![ClusterCount { right, replies: 6 }; 10];
+        let (blind, again) = (counts(2), counts(6));
+        let drawn = drawn_shares(&blind, &draws)
+            .into_iter()
+            .zip(drawn_shares(&again, &draws))
+            .map(|(floor, ceiling)| [floor, ceiling])
+            .collect();
+        let bounds = Bounds {
+            blind,
+            again,
+            drawn,
+        };
+        for (right, expected) in [(2, 0.0), (6, 1.0)] {
+            let kept = evidence(&counts(right), &[], &bounds, &draws).unwrap();
+            assert!((kept.value - expected).abs() < 1e-12);
+            // 60 equal pairs, of which the two added ones count 1 + 0.2 · 5 times, and a distance of two thirds.
+            let half = crate::comparisons::paired::difference(&[(0.0, 6.0); 10], 0.0, 60).high;
+            assert!(
+                (kept.high - expected - 1.5 * half).abs() < 1e-12,
+                "{kept:?}"
+            );
+            assert!((expected - kept.low - 1.5 * half).abs() < 1e-12, "{kept:?}");
+        }
+    }
 }
