@@ -257,7 +257,8 @@ fn false_claims_are_rare() {
         println!("| {} | {} |", claimed.name, percent(count, runs()));
         let share = darkqa_score::estimate::Estimate::share(count, runs()).unwrap();
         if claimed.name.starts_with("true: ") {
-            assert!(share.high > 0.5, "{}: {share:?}", claimed.name);
+            // A true effect is claimed more often than a false one may be.
+            assert!(share.low > 0.05, "{}: {share:?}", claimed.name);
         } else {
             assert!(share.low <= 0.05, "{}: {share:?}", claimed.name);
         }
