@@ -99,7 +99,9 @@ impl SceneArgs {
         match (self.light, place) {
             (Some(light), _) => Ok(light),
             (None, DataPlace::Path(path)) if path.is_dir() => frames::light(path, further),
-            (None, DataPlace::Path(path)) if is_archive(path) => ready_made::light_of_archive(path),
+            (None, DataPlace::Path(path)) if ready_made::is_zip_file(path) => {
+                ready_made::light_of_archive(path)
+            }
             (None, _) => Ok(SetLight::Lit),
         }
     }
@@ -154,13 +156,6 @@ impl SceneArgs {
         let root = Root::new(folder, further)?;
         label_folders::open(&root, question, self.choices).map(Some)
     }
-}
-
-fn is_archive(path: &Path) -> bool {
-    path.is_file()
-        && path
-            .extension()
-            .is_some_and(|name| name.eq_ignore_ascii_case("zip"))
 }
 
 #[cfg(test)]

@@ -69,7 +69,7 @@ impl Scores {
     pub(super) fn new(joined: JoinedRuns) -> Result<Self> {
         let JoinedRuns {
             run,
-            alerts,
+            mut alerts,
             enhancers,
             listing,
         } = joined;
@@ -108,7 +108,6 @@ impl Scores {
         }
         let groups: Vec<QuestionGroups> = run.questions.iter().map(question_groups).collect();
         let summary = open_summary_listed(&scored, &groups, &listing);
-        let mut alerts = alerts;
         alerts.extend(unscored_alerts(&summary));
         alerts.sort_by_key(|alert| alert.kind);
         Ok(Self {

@@ -116,7 +116,7 @@ fn leaders(best: &BestInTheDark) -> Vec<String> {
 /// Maximum rounding error of equal means (chosen).
 const ROUNDING: f64 = 1e-9;
 
-/// Two models of which one is detected to be better at some levels, and the other one at others.
+/// Two models, each detected to be better than the other at some levels.
 struct DetectedCrossing<'b> {
     crossing: &'b Crossing,
     /// Levels at which the leader in the light is better.

@@ -1,5 +1,7 @@
 //! Sentences about levels whose verdict depends on missing replies: [`Undecided`].
 
+use std::collections::BTreeSet;
+
 use super::sample::listed;
 use super::sentence::{Numbers, Sentence, Tone, level_runs, models};
 use crate::types::{AxisLevel, Variant, View};
@@ -37,12 +39,11 @@ impl<'f> Undecided<'f> {
 
     /// The levels without a verdict, in words.
     pub(super) fn at(&self) -> String {
-        let mut all: Vec<AxisLevel> = self.levels.iter().map(|finding| finding.level).collect();
-        all.extend(&self.silent);
-        all.sort_unstable();
-        let mut without: Vec<AxisLevel> = self.open.iter().map(|finding| finding.level).collect();
-        without.extend(&self.silent);
-        without.sort_unstable();
+        let [all, without] = [&self.levels, &self.open].map(|findings| {
+            let levels = findings.iter().map(|finding| finding.level);
+            let levels: BTreeSet<AxisLevel> = levels.chain(self.silent.iter().copied()).collect();
+            levels.into_iter().collect::<Vec<_>>()
+        });
         level_runs(&without, &all)
     }
 
@@ -114,8 +115,22 @@ fn missing_share(finding: &PooledFinding) -> f64 {
 
 /// Levels at which raw images of a variant were asked, and at which no question has all replies.
 pub(super) fn silent_levels(findings: &Findings<'_>, variant: &Variant) -> Vec<AxisLevel> {
+    let found: BTreeSet<AxisLevel> = findings
+        .pooled
+        .iter()
+        .filter(|finding| {
+            finding.kind == PooledKind::Darkness
+                && finding.family.is_none()
+                && finding.variant == *variant
+        })
+        .map(|finding| finding.level)
+        .collect();
+    if found.is_empty() {
+        // L0 was not asked or has no reply: there is nothing to compare with.
+        return Vec::new();
+    }
     let models = findings.models_of(variant);
-    let mut levels: Vec<AxisLevel> = findings
+    let asked: BTreeSet<AxisLevel> = findings
         .grid
         .subjects
         .iter()
@@ -126,21 +141,6 @@ pub(super) fn silent_levels(findings: &Findings<'_>, variant: &Variant) -> Vec<A
                 && models.contains(&&*subject.model)
         })
         .filter_map(|subject| subject.level)
-        .filter(|level| {
-            !findings.pooled.iter().any(|finding| {
-                finding.kind == PooledKind::Darkness
-                    && finding.family.is_none()
-                    && finding.variant == *variant
-                    && finding.level == *level
-            })
-        })
         .collect();
-    levels.sort_unstable();
-    levels.dedup();
-    // Without any finding, L0 was not asked or has no reply: there is nothing to compare with.
-    let has_findings = findings
-        .pooled
-        .iter()
-        .any(|finding| finding.kind == PooledKind::Darkness && finding.variant == *variant);
-    if has_findings { levels } else { Vec::new() }
+    asked.difference(&found).copied().collect()
 }

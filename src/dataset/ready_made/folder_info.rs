@@ -57,7 +57,7 @@ impl FolderInfo {
 }
 
 /// Light in which the photographs of a ZIP file were taken, from its `dataset.json`; lit by default.
-pub(in crate::dataset) fn light_of_archive(path: &Path) -> Result<SetLight> {
+pub(crate) fn light_of_archive(path: &Path) -> Result<SetLight> {
     let archive = Archive::open(path)?;
     if !archive.has(FolderInfo::FILE) {
         return Ok(SetLight::Lit);

@@ -34,7 +34,7 @@ use crate::error::{Error, Result};
 use crate::types::{Choices, Family, FrameId, Question};
 
 pub(super) use choices::one_line;
-pub(super) use container::{Archive, is_set_folder};
+pub(super) use container::{Archive, is_set_folder, is_zip_file};
 pub(crate) use container::{ParquetColumns, cached_snapshot, refuse_lfs_pointer};
 pub(super) use folder_info::light_of_archive;
 pub(crate) use omissions::SkipBad;

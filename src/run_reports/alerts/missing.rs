@@ -11,7 +11,7 @@ use darkqa_score::model_in_condition::ModelInCondition;
 const MAX_MISSING: f64 = 0.02;
 
 /// Numbers of missing replies and of all trials of a subject.
-pub(in crate::run_reports) type MissingCounts<'m> = (&'m ModelInCondition, [usize; 2]);
+pub(crate) type MissingCounts<'m> = (&'m ModelInCondition, [usize; 2]);
 
 /// Numbers of missing replies of each subject with images.
 pub(super) fn counts(health: &[Health]) -> Vec<MissingCounts<'_>> {
@@ -27,10 +27,7 @@ pub(super) fn counts(health: &[Health]) -> Vec<MissingCounts<'_>> {
 
 /// One alert for each model with more than 2 % of its replies missing in a condition. It names the condition with the largest share, and
 /// the share at L0. `noun` is what is missing.
-pub(in crate::run_reports) fn missing_alerts(
-    counts: &[MissingCounts<'_>],
-    noun: &str,
-) -> Vec<Alert> {
+pub(crate) fn missing_alerts(counts: &[MissingCounts<'_>], noun: &str) -> Vec<Alert> {
     let mut models = BTreeMap::<&str, Vec<&MissingCounts<'_>>>::new();
     for one in counts.iter().filter(|(_, [_, all])| *all > 0) {
         models.entry(&one.0.model).or_default().push(one);

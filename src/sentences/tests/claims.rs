@@ -3,10 +3,10 @@
 use rand::rngs::StdRng;
 use rand::{RngExt as _, SeedableRng as _};
 
-use super::records::unanswered;
+use super::records::{record, unanswered};
 use super::simulation::{normals, percent, runs, set_answer};
 use crate::sentences::{Sentence, sentences};
-use crate::types::{ChoiceDetail, Condition, Digest, Family, QuestionId, Record};
+use crate::types::{ChoiceDetail, Condition, Family, Record};
 use darkqa_score::cluster::FrameTies;
 use darkqa_score::findings::Findings;
 
@@ -78,16 +78,7 @@ impl Claimed {
                             continue;
                         }
                     }
-                    let key =
-                        Digest::from_bytes(format!("{item} {model} {name}").as_bytes()).into();
-                    let question = QuestionId(format!("q{item:04}"));
-                    records.push(Record::blank(
-                        key,
-                        question,
-                        model,
-                        condition.clone(),
-                        detail,
-                    ));
+                    records.push(record(item, model, condition.clone(), detail));
                 }
             }
         }

@@ -3,10 +3,10 @@
 use rand::rngs::StdRng;
 use rand::{RngExt as _, SeedableRng as _};
 
-use super::records::unanswered;
+use super::records::{record, unanswered};
 use super::simulation::{percent, runs};
 use crate::sentences::{Tone, sentences};
-use crate::types::{Condition, Digest, Family, ParsedAnswer, QuestionId, Record, TrialOutcome};
+use crate::types::{Condition, Family, ParsedAnswer, Record, TrialOutcome};
 use darkqa_score::cluster::FrameTies;
 use darkqa_score::comparisons::PooledKind;
 use darkqa_score::findings::Findings;
@@ -41,6 +41,13 @@ const REFUSING: Design = Design {
     missing: Missing::Wrong,
     right: [0.9, 0.9, 0.85, 0.8, 0.7, 0.55],
     missing_shares: [0.0, 0.0, 0.1, 0.2, 0.3, 0.45],
+};
+
+/// Refuses in the dark what it would get right; darkness costs nothing.
+const REFUSING_RIGHT: Design = Design {
+    missing: Missing::Right,
+    right: [0.8; 6],
+    missing_shares: [0.0, 0.0, 0.0, 0.0, 0.2, 0.4],
 };
 
 impl Design {
@@ -79,9 +86,7 @@ impl Design {
                         TrialOutcome::Wrong
                     };
                 }
-                let key = Digest::from_bytes(format!("{item} {name}").as_bytes()).into();
-                let question = QuestionId(format!("q{item:03}"));
-                records.push(Record::blank(key, question, "m", condition.clone(), detail));
+                records.push(record(item, "m", condition.clone(), detail));
             }
         }
         records
@@ -144,12 +149,7 @@ fn refusals_of_wrong_answers_are_no_sight() {
 
 #[test]
 fn refusals_of_right_answers_are_no_loss() {
-    let design = Design {
-        missing: Missing::Right,
-        right: [0.8; 6],
-        missing_shares: [0.0, 0.0, 0.0, 0.0, 0.2, 0.4],
-    };
-    let counts = simulate(&design, 60);
+    let counts = simulate(&REFUSING_RIGHT, 60);
     assert_eq!(counts.lost, 0, "{counts:?}");
     assert!(counts.covered >= 55, "{counts:?}");
 }
@@ -196,57 +196,24 @@ fn missing_replies_neither_hide_nor_make_a_loss() {
     println!(
         "| missing | misleading | threshold beyond 9 EV | interval holds the truth | loss detected |"
     );
-    let loss = |points: f64| [0.9, 0.9, 0.9, 0.9, 0.9 - points, 0.9 - points];
+    let none = Design {
+        missing: Missing::Random,
+        right: [0.9; 6],
+        missing_shares: [0.0; 6],
+    };
+    let at_random = |loss: f64, missing: f64| Design {
+        right: [0.9, 0.9, 0.9, 0.9, 0.9 - loss, 0.9 - loss],
+        missing_shares: [missing; 6],
+        ..none
+    };
     for (name, design) in [
         ("refuses wrong", REFUSING),
-        (
-            "refuses right",
-            Design {
-                missing: Missing::Right,
-                right: [0.8; 6],
-                missing_shares: [0.0, 0.0, 0.0, 0.0, 0.2, 0.4],
-            },
-        ),
-        (
-            "no loss, none missing",
-            Design {
-                missing: Missing::Random,
-                right: [0.9; 6],
-                missing_shares: [0.0; 6],
-            },
-        ),
-        (
-            "loss of 10, none missing",
-            Design {
-                missing: Missing::Random,
-                right: loss(0.1),
-                missing_shares: [0.0; 6],
-            },
-        ),
-        (
-            "loss of 10, 1 % at random",
-            Design {
-                missing: Missing::Random,
-                right: loss(0.1),
-                missing_shares: [0.01; 6],
-            },
-        ),
-        (
-            "loss of 10, 3 % at random",
-            Design {
-                missing: Missing::Random,
-                right: loss(0.1),
-                missing_shares: [0.03; 6],
-            },
-        ),
-        (
-            "loss of 20, 3 % at random",
-            Design {
-                missing: Missing::Random,
-                right: loss(0.2),
-                missing_shares: [0.03; 6],
-            },
-        ),
+        ("refuses right", REFUSING_RIGHT),
+        ("no loss, none missing", none),
+        ("loss of 10, none missing", at_random(0.1, 0.0)),
+        ("loss of 10, 1 % at random", at_random(0.1, 0.01)),
+        ("loss of 10, 3 % at random", at_random(0.1, 0.03)),
+        ("loss of 20, 3 % at random", at_random(0.2, 0.03)),
     ] {
         let counts = simulate(&design, runs());
         let [misleading, beyond, covered, lost] = [

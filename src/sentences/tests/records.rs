@@ -37,18 +37,30 @@ fn asked(model: &str, frames: usize, conditions: &[(&str, f64)]) -> Vec<Record> 
                     &["a", "b", "c"],
                 )
             };
-            let key = Digest::from_bytes(format!("{item} {model} {name}").as_bytes()).into();
-            let question = QuestionId(format!("q{item:02}"));
-            records.push(Record::blank(
-                key,
-                question,
-                model,
-                condition.clone(),
-                detail,
-            ));
+            records.push(record(item, model, condition.clone(), detail));
         }
     }
     records
+}
+
+/// The record of a model about an item in a condition, or without an image.
+pub(super) fn record(
+    item: usize,
+    model: &str,
+    condition: Option<Condition>,
+    detail: ChoiceDetail,
+) -> Record {
+    let name = condition
+        .as_ref()
+        .map_or_else(String::new, ToString::to_string);
+    let key = Digest::from_bytes(format!("{item} {model} {name}").as_bytes()).into();
+    Record::blank(
+        key,
+        QuestionId(format!("q{item:04}")),
+        model,
+        condition,
+        detail,
+    )
 }
 
 /// A question about a frame whose first choice is true, without an answer.

@@ -6,11 +6,11 @@ use rand::rngs::StdRng;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_distr::{Distribution, StandardNormal};
 
-use super::records::unanswered;
+use super::records::{record, unanswered};
 use crate::sentences::{Sentence, Tone, sentences};
 use crate::types::{
-    ChoiceDetail, Condition, Digest, Family, FrameId, OptionProbabilities, ParsedAnswer,
-    QuestionId, Record, TrialOutcome,
+    ChoiceDetail, Condition, Family, FrameId, OptionProbabilities, ParsedAnswer, QuestionId,
+    Record, TrialOutcome,
 };
 use darkqa_score::accuracies::healths;
 use darkqa_score::cluster::{Clusters, FrameTies};
@@ -89,16 +89,7 @@ impl Design {
                 for item in 0..4 * self.frames {
                     let (family, choices) = &QUESTIONS[item % 4];
                     let detail = unanswered(format!("f{:03}", item / 4), family.clone(), choices);
-                    let key =
-                        Digest::from_bytes(format!("{item} {model} {name}").as_bytes()).into();
-                    let question = QuestionId(format!("q{item:04}"));
-                    records.push(Record::blank(
-                        key,
-                        question,
-                        &model,
-                        condition.clone(),
-                        detail,
-                    ));
+                    records.push(record(item, &model, condition.clone(), detail));
                 }
             }
         }

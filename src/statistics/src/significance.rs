@@ -25,9 +25,9 @@ pub enum Significance {
     Missing,
 }
 
-/// Corrected p-values behind a verdict.
+/// p-values of a test with missing replies, before or after correction.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CorrectedP {
+pub struct PValues {
     /// p-value that holds whatever the missing replies would have been.
     pub p: f64,
     /// Smallest p-value that any values of the missing replies could give; `p` if no reply is missing.
@@ -36,22 +36,32 @@ pub struct CorrectedP {
     pub least: f64,
 }
 
-impl CorrectedP {
-    /// p-values of a test without missing replies.
+impl PValues {
+    /// Corrects each of the three p-values over all tests, by Holm's procedure ([`holm`]).
     #[must_use]
-    pub fn complete(p: f64, least: f64) -> Self {
-        Self {
-            p,
-            if_answered: p,
-            least,
-        }
+    pub fn corrected(tests: &[Self]) -> Vec<Self> {
+        let [p, if_answered, least] = [
+            |test: &Self| test.p,
+            |test: &Self| test.if_answered,
+            |test: &Self| test.least,
+        ]
+        .map(|value| holm(&tests.iter().map(value).collect::<Vec<f64>>()));
+        p.into_iter()
+            .zip(if_answered)
+            .zip(least)
+            .map(|((p, if_answered), least)| Self {
+                p,
+                if_answered,
+                least,
+            })
+            .collect()
     }
 }
 
 impl Significance {
-    /// The result for a difference with these p-values.
+    /// The result for a difference with these corrected p-values.
     #[must_use]
-    pub fn new(difference: f64, corrected: CorrectedP) -> Self {
+    pub fn new(difference: f64, corrected: PValues) -> Self {
         if corrected.least >= ALPHA {
             Self::TooFewClusters
         } else if corrected.p >= ALPHA && corrected.if_answered < ALPHA {
@@ -351,6 +361,15 @@ mod tests {
         (1.0, 1.0),
     ];
 
+    /// p-values of a test without missing replies.
+    fn complete(p: f64, least: f64) -> PValues {
+        PValues {
+            p,
+            if_answered: p,
+            least,
+        }
+    }
+
     #[test]
     fn mcnemar_is_the_sign_test() {
         // scipy 1.17.1, binomtest(b, b + c).pvalue.
@@ -454,16 +473,13 @@ mod tests {
         assert!((least_p(0) - 1.0).abs() < 1e-15);
         for (clusters, expected) in [(8, Significance::Worse), (7, Significance::TooFewClusters)] {
             let least = 5.0 * least_p(clusters);
-            assert_eq!(
-                Significance::new(-0.3, CorrectedP::complete(least, least)),
-                expected
-            );
+            assert_eq!(Significance::new(-0.3, complete(least, least)), expected);
         }
         assert_eq!(
-            Significance::new(0.3, CorrectedP::complete(0.05, 0.01)),
+            Significance::new(0.3, complete(0.05, 0.01)),
             Significance::NotShown
         );
-        let undecided = CorrectedP {
+        let undecided = PValues {
             p: 0.2,
             if_answered: 0.04,
             least: 0.01,

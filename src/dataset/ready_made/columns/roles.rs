@@ -113,7 +113,7 @@ impl Roles {
     ///
     /// # Errors
     /// If a column of the map does not exist.
-    pub(in crate::dataset::ready_made) fn with_question(
+    pub(crate) fn with_question(
         table: &Table,
         map: &ColumnMap,
         question: QuestionSource,
@@ -322,7 +322,7 @@ fn no_question(table: &Table, map: &ColumnMap) -> Result<String, String> {
 }
 
 /// A column with images in its cells.
-pub(in crate::dataset::ready_made) fn embedded_images(table: &Table) -> Option<Column> {
+pub(crate) fn embedded_images(table: &Table) -> Option<Column> {
     let is_image = |cell: &Cell| match cell {
         Cell::Bytes(_) | Cell::File(_) => true,
         Cell::Fields(fields) => fields.iter().any(|(name, _)| &**name == "bytes"),

@@ -74,7 +74,7 @@ impl Archive {
     ///
     /// # Errors
     /// If it is not a ZIP file, or an entry is a link or has a path that is absolute or leads outside.
-    pub(in crate::dataset::ready_made) fn open(path: &Path) -> Result<Self> {
+    pub(crate) fn open(path: &Path) -> Result<Self> {
         let file = reading::open(path).map_err(|e| Error::file(path, "read", e))?;
         let remaining = Arc::new(AtomicU64::new(MAX_DIRECTORY_BYTES));
         let bounded = BoundedFile {

@@ -7,7 +7,7 @@ use super::archive::Archive;
 use super::choose::{choose_files, is_set};
 use super::shards::{check_shards, single_shard_note};
 use super::tree::Tree;
-use super::{SetFile, extension};
+use super::{SetFile, extension, is_zip_file};
 use crate::dataset::ready_made::settings::SetArgs;
 use crate::dataset::root::{Location, Root};
 use crate::error::{Error, Result};
@@ -124,7 +124,7 @@ fn files_at(place: &Path, args: &SetArgs) -> Result<FoundFiles> {
         let problem = format_args!("{text}: no such file or folder");
         return Err(Error::usage("--data", problem));
     }
-    if place.is_file() && extension(place) == "zip" {
+    if is_zip_file(place) {
         let archive = Arc::new(Archive::open(place)?);
         return files_in_tree(&Tree::Archive(archive), args);
     }

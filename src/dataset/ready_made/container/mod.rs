@@ -191,6 +191,11 @@ impl SetFile {
     }
 }
 
+/// True for a ZIP file, by its name.
+pub(crate) fn is_zip_file(path: &Path) -> bool {
+    path.is_file() && extension(path) == "zip"
+}
+
 /// Extension of a file name, in lower case.
 fn extension(path: &Path) -> String {
     path.extension()

@@ -10,7 +10,7 @@ use super::chance::{OfferedChoices, chance, chance_of_questions};
 use super::health::Health;
 use crate::choice::ParsingMode;
 use crate::estimate::{ClusterCount, Estimate};
-use crate::grid::{Grid, GridItem, TrialResult};
+use crate::grid::{Grid, GridItem};
 use crate::model_in_condition::{CHANCE, ModelInCondition};
 use darkqa_ground::types::{Family, UnreadReason, Variant};
 
@@ -64,7 +64,7 @@ pub struct AccuracySummary {
     /// Chance with each question counted once, if several orders of choices are asked and this changes chance.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub chance_of_questions: Option<Estimate>,
-    /// Families of which one answer is true so often that accuracy misleads.
+    /// Families with one answer that is true so often that accuracy misleads.
     #[serde(skip)]
     pub unbalanced: Vec<UnbalancedFamily>,
 }
@@ -106,14 +106,14 @@ pub(crate) fn summarize(
     let questions: Vec<OfferedChoices> = questions.into_iter().collect();
     let families = grid.groups();
     let unbalanced = UnbalancedFamily::all(grid);
+    let imbalance = &unbalanced[..];
     let mut cells: Vec<AccuracyCell> = (0..grid.subjects.len())
         .into_par_iter()
         .flat_map_iter(|subject| {
             families.iter().flat_map(move |family| {
-                ParsingMode::ALL.map(|mode| cell(grid, subject, *family, mode))
+                ParsingMode::ALL.map(|mode| cell(grid, subject, *family, mode, imbalance))
             })
         })
-        .map(|cell| with_balance(grid, cell, &unbalanced))
         .collect();
     // A family that a subject was not asked about gets no cell.
     cells.retain(|cell| cell.accuracy.is_some() || cell.failed > 0);
@@ -123,26 +123,6 @@ pub(crate) fn summarize(
         unread: unread(health),
         chance_of_questions: chance_of_questions(&questions),
         unbalanced,
-    }
-}
-
-/// The cell with its balanced accuracy, if one of its families is unbalanced.
-fn with_balance(
-    grid: &Grid<'_>,
-    cell: AccuracyCell,
-    unbalanced: &[UnbalancedFamily],
-) -> AccuracyCell {
-    let family = cell.family.as_ref();
-    let is_unbalanced = unbalanced
-        .iter()
-        .any(|one| family.is_none_or(|family| one.family == *family));
-    if !is_unbalanced {
-        return cell;
-    }
-    let subject = grid.find(&cell.subject);
-    AccuracyCell {
-        balanced: subject.and_then(|subject| balanced_accuracy(grid, subject, family, cell.mode)),
-        ..cell
     }
 }
 
@@ -160,8 +140,9 @@ fn cell(
     subject: usize,
     family: Option<&Family>,
     mode: ParsingMode,
+    unbalanced: &[UnbalancedFamily],
 ) -> AccuracyCell {
-    let (mut unparsed, mut failed) = (0, 0);
+    let mut unparsed = 0;
     for (index, _) in grid
         .items
         .iter()
@@ -169,21 +150,26 @@ fn cell(
         .filter(|(_, item)| item.is_in_family(family))
     {
         let result = grid.result(subject, index);
-        failed += usize::from(result == TrialResult::Failed);
         unparsed +=
             usize::from(result.reading(mode) == Some(None) && !cannot_tell(grid, subject, index));
     }
     let counts = grid.counts(subject, family, mode);
+    let failed = grid.failed(subject, family);
+    let is_unbalanced = unbalanced
+        .iter()
+        .any(|one| family.is_none_or(|family| one.family == *family));
     AccuracyCell {
         subject: grid.subjects[subject].clone(),
         family: family.cloned(),
         mode,
         right: counts.iter().map(|count| count.right as usize).sum(),
         unparsed,
-        failed,
-        accuracy: Estimate::with_missing(&counts, &grid.failed(subject, family)),
+        failed: failed.iter().map(|count| *count as usize).sum(),
+        accuracy: Estimate::with_missing(&counts, &failed),
         always: always(grid, subject, family, mode),
-        balanced: None,
+        balanced: is_unbalanced
+            .then(|| balanced_accuracy(grid, subject, family, mode))
+            .flatten(),
     }
 }
 

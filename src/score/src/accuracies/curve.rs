@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use crate::bootstrap::Resamples;
 use crate::choice::ParsingMode;
+use crate::estimate::ClusterCount;
 use crate::grid::{Grid, TrialResult};
 use crate::model_in_condition::ModelInCondition;
 use crate::threshold::{CurveSummary, LevelCounts};
@@ -19,7 +20,7 @@ pub struct Curve {
     pub enhancer: Option<EnhancerName>,
     /// Question family; `None` for all families together.
     pub family: Option<Family>,
-    /// True if the floor is the accuracy of the model itself without images; false if it is that of guessing.
+    /// True if the floor is the accuracy of the model itself without images; false if guessing is the floor.
     pub floor_is_blind: bool,
     /// Threshold and area in the strict parsing, which is the main result.
     pub summary: CurveSummary,
@@ -114,24 +115,33 @@ fn curve(
     points: CurvePoints,
 ) -> Option<Curve> {
     let subjects = &points.subjects;
-    let clean = subjects[0].1;
+    let missing: Vec<Vec<u32>> = subjects
+        .iter()
+        .map(|(_, subject)| grid.failed(*subject, family))
+        .collect();
     let blind = grid.find_up_to_group(&ModelInCondition::new(&points.model, None));
-    let floors = ParsingMode::ALL.map(|mode| Floor::new(grid, clean, blind, family, mode));
-    let [strict, lenient] = [0, 1]
-        .map(|index| (ParsingMode::ALL[index], &floors[index]))
-        .map(|(mode, floor)| LevelCounts {
-            levels: subjects.iter().map(|(level, _)| *level).collect(),
-            counts: subjects
-                .iter()
-                .map(|(_, subject)| grid.counts(*subject, family, mode))
-                .collect(),
-            missing: subjects
-                .iter()
-                .map(|(_, subject)| grid.failed(*subject, family))
-                .collect(),
-            guesses: floor.replies.clone(),
-            missing_guesses: floor.missing.clone(),
+    let [(strict, floor_is_blind), (lenient, _)] = ParsingMode::ALL.map(|mode| {
+        let counts: Vec<Vec<ClusterCount>> = subjects
+            .iter()
+            .map(|(_, subject)| grid.counts(*subject, family, mode))
+            .collect();
+        let guessing = Floor::of_guessing(grid, subjects[0].1, family);
+        let seeing_nothing = blind.and_then(|blind| {
+            Floor::of_blind(&grid.counts(blind, family, mode), &counts[0], &missing[0])
         });
+        // Only what images add can be lost in the dark; without an image the model may still be worse than a guess.
+        let floor = seeing_nothing.filter(|floor| floor.total() > guessing.total());
+        let is_blind = floor.is_some();
+        let floor = floor.unwrap_or(guessing);
+        let levels = LevelCounts {
+            levels: subjects.iter().map(|(level, _)| *level).collect(),
+            counts,
+            missing: missing.clone(),
+            guesses: floor.replies,
+            missing_guesses: floor.missing,
+        };
+        (levels, is_blind)
+    });
     let summary = strict.summary(draws)?;
     Some(Curve {
         lenient: if lenient.counts == strict.counts {
@@ -139,7 +149,7 @@ fn curve(
         } else {
             lenient.summary(draws)?
         },
-        floor_is_blind: floors[0].is_blind,
+        floor_is_blind,
         summary,
         model: points.model,
         variant: points.variant,
@@ -149,69 +159,52 @@ fn curve(
 }
 
 /// Expected numbers of right replies at L0 without the image, by cluster.
-struct Floor {
+pub(crate) struct Floor {
     /// Among the replies.
-    replies: Vec<f32>,
+    pub(crate) replies: Vec<f32>,
     /// Among the missing replies.
-    missing: Vec<f32>,
-    /// True if they are those of the model itself, asked without images; false if they are those of guessing.
-    is_blind: bool,
+    pub(crate) missing: Vec<f32>,
 }
 
 impl Floor {
-    /// The floor of a model: its own accuracy without images, because only what images add can be lost in the dark; or that of guessing, if
-    /// it is larger or the model was not asked without images.
-    fn new(
-        grid: &Grid<'_>,
-        clean: usize,
-        blind: Option<usize>,
-        family: Option<&Family>,
-        mode: ParsingMode,
-    ) -> Self {
-        let replies = guesses(grid, clean, family, TrialResult::is_reply);
-        let missing = guesses(grid, clean, family, |result| result == TrialResult::Failed);
-        let guessing = Self {
-            replies,
-            missing,
-            is_blind: false,
-        };
-        let Some(blind) = blind else {
-            return guessing;
-        };
-        let blind = grid.counts(blind, family, mode);
-        let [right, blind_replies] = [
-            blind
-                .iter()
-                .map(|count| f64::from(count.right))
-                .sum::<f64>(),
-            blind.iter().map(|count| f64::from(count.replies)).sum(),
-        ];
-        let clean_counts = grid.counts(clean, family, mode);
-        let clean_replies: f64 = clean_counts
-            .iter()
-            .map(|count| f64::from(count.replies))
-            .sum();
-        let guessed: f64 = guessing
-            .replies
-            .iter()
-            .map(|guesses| f64::from(*guesses))
-            .sum();
-        if blind_replies == 0.0 || right / blind_replies <= guessed / clean_replies {
-            return guessing;
-        }
-        let scale = clean_replies / blind_replies;
+    /// The floor of guessing.
+    fn of_guessing(grid: &Grid<'_>, clean: usize, family: Option<&Family>) -> Self {
         Self {
+            replies: guesses(grid, clean, family, TrialResult::is_reply),
+            missing: guesses(grid, clean, family, |result| result == TrialResult::Failed),
+        }
+    }
+
+    /// The floor of a model that was asked without images, scaled to its number of replies at L0 (`clean`). `missing` is the number of
+    /// missing replies at L0. `None` without a reply.
+    pub(crate) fn of_blind(
+        blind: &[ClusterCount],
+        clean: &[ClusterCount],
+        missing: &[u32],
+    ) -> Option<Self> {
+        let sum = |counts: &[ClusterCount], count: fn(&ClusterCount) -> u32| -> f64 {
+            counts.iter().map(|one| f64::from(count(one))).sum()
+        };
+        let replies = sum(blind, |count| count.replies);
+        let (scale, share) = (
+            sum(clean, |count| count.replies) / replies,
+            sum(blind, |count| count.right) / replies,
+        );
+        (replies > 0.0).then(|| Self {
             replies: blind
                 .iter()
                 .map(|count| (f64::from(count.right) * scale) as f32)
                 .collect(),
-            missing: grid
-                .failed(clean, family)
+            missing: missing
                 .iter()
-                .map(|failed| (f64::from(*failed) * right / blind_replies) as f32)
+                .map(|missing| (f64::from(*missing) * share) as f32)
                 .collect(),
-            is_blind: true,
-        }
+        })
+    }
+
+    /// Expected number of right replies, of all replies at L0.
+    fn total(&self) -> f64 {
+        self.replies.iter().map(|right| f64::from(*right)).sum()
     }
 }
 

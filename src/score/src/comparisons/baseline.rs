@@ -1,13 +1,12 @@
 //! Comparison of new runs with an old one: [`BaselineRow`].
 
 use super::comparison::MIN_PAIRS;
-use super::holm_of;
 use super::paired::PairedComparison;
 use crate::accuracies::Health;
 use crate::choice::ParsingMode;
 use crate::grid::Grid;
 use crate::model_in_condition::ModelInCondition;
-use crate::significance::{ALPHA, CorrectedP, Significance, least_p};
+use crate::significance::{ALPHA, PValues, Significance};
 
 /// Comparison of a model in a condition between the new runs and the old one.
 #[derive(Debug, Clone, PartialEq)]
@@ -91,19 +90,12 @@ pub fn baseline_rows(
 
 /// Applies Holm's correction to the tests of these rows, so that the probability of any false verdict is at most 5 %.
 fn correct(mut rows: Vec<&mut BaselineRow>) {
-    let corrected = holm_of(rows.iter().map(|row| row.paired.p));
-    let if_answered = holm_of(rows.iter().map(|row| row.paired.p_if_answered));
-    let least = holm_of(rows.iter().map(|row| least_p(row.paired.clusters)));
+    let tests: Vec<PValues> = rows.iter().map(|row| row.paired.p_values()).collect();
     let level = ALPHA / rows.len() as f64;
-    for (index, row) in rows.iter_mut().enumerate() {
-        row.holm = corrected[index];
+    for (row, corrected) in rows.iter_mut().zip(PValues::corrected(&tests)) {
+        row.holm = corrected.p;
         row.detectable = row.paired.spread.detectable(level);
         if row.paired.difference.n >= MIN_PAIRS {
-            let corrected = CorrectedP {
-                p: corrected[index],
-                if_answered: if_answered[index],
-                least: least[index],
-            };
             row.significance = Significance::new(row.paired.difference.value, corrected);
         }
     }

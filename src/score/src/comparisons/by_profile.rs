@@ -439,22 +439,14 @@ impl SharedItems {
         if pairs.is_empty() {
             return None;
         }
-        // Smallest and largest difference of an item; a pair without any reply counts as equal.
         let bounds = |index: usize| {
             let item = &grid.items[index];
-            pairs
-                .iter()
-                .map(|(first, second)| {
-                    [*first, *second].map(|subject| {
-                        let reading = grid.result(subject, index).reading(ParsingMode::Strict);
-                        reading.map(|chosen| item.is_right(chosen))
-                    })
+            net_bounds(pairs.iter().map(|(first, second)| {
+                [*first, *second].map(|subject| {
+                    let reading = grid.result(subject, index).reading(ParsingMode::Strict);
+                    reading.map(|chosen| item.is_right(chosen))
                 })
-                .filter(|sides| sides.iter().any(Option::is_some))
-                .map(net_bounds)
-                .fold([0, 0], |sum, bounds| {
-                    [sum[0] + bounds[0], sum[1] + bounds[1]]
-                })
+            }))
         };
         let mut sums = BoundedSums::new(grid.clusters);
         for &index in &self.answered {

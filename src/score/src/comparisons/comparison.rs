@@ -5,12 +5,11 @@ mod real_synthetic;
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::claim::{Claim, ParsedFinding};
-use super::holm_of;
 use super::paired::PairedComparison;
 use crate::choice::ParsingMode;
 use crate::grid::Grid;
 use crate::model_in_condition::{ModelInCondition, models_under_test};
-use crate::significance::{CorrectedP, Significance, least_p};
+use crate::significance::{PValues, Significance};
 use darkqa_ground::types::{AxisLevel, EnhancerName, Family, PairDark, Variant, View};
 use rayon::prelude::*;
 
@@ -132,7 +131,7 @@ impl Comparison {
         Claim::new(strict, lenient)
     }
 
-    /// Verdict in tables, which is that of the sentences; `None` if no sentence is about the comparison.
+    /// Verdict in tables, the same as in sentences; `None` if no sentence is about the comparison.
     #[must_use]
     pub fn verdict(&self) -> Option<Significance> {
         self.claim()
@@ -255,27 +254,19 @@ fn corrected(mut all: Vec<Comparison>) -> Vec<Comparison> {
         let own = set.iter().map(|index| &all[*index]);
         let [strict, lenient] = ParsingMode::ALL.map(|mode| {
             let paired = own.clone().map(|found| &found.parsed(mode).paired);
-            [
-                holm_of(paired.clone().map(|paired| paired.p)),
-                holm_of(paired.map(|paired| paired.p_if_answered)),
-            ]
+            let tests: Vec<PValues> = paired.map(PairedComparison::p_values).collect();
+            PValues::corrected(&tests)
         });
-        let least = holm_of(own.map(|found| least_p(found.strict.paired.clusters)));
         for (position, index) in set.into_iter().enumerate() {
             let comparison = &mut all[index];
             let is_too_small = comparison.is_too_small();
-            comparison.least_holm = least[position];
-            for (tested, [holm, if_answered]) in [
-                (&mut comparison.strict, &strict),
-                (&mut comparison.lenient, &lenient),
+            comparison.least_holm = strict[position].least;
+            for (tested, corrected) in [
+                (&mut comparison.strict, strict[position]),
+                (&mut comparison.lenient, lenient[position]),
             ] {
                 let difference = tested.paired.difference.value;
-                tested.holm = holm[position];
-                let corrected = CorrectedP {
-                    p: holm[position],
-                    if_answered: if_answered[position],
-                    least: least[position],
-                };
+                tested.holm = corrected.p;
                 tested.significance = if is_too_small {
                     Significance::TooFew
                 } else {

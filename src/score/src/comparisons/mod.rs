@@ -34,8 +34,3 @@ pub use pooled::{
 };
 pub use pooled_kind::PooledKind;
 pub use ranks::{RankRange, rank_ranges};
-
-/// p-values after the Holm correction.
-fn holm_of(p_values: impl Iterator<Item = f64>) -> Vec<f64> {
-    crate::significance::holm(&p_values.collect::<Vec<_>>())
-}

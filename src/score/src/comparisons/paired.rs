@@ -3,7 +3,7 @@
 use crate::choice::ParsingMode;
 use crate::estimate::Estimate;
 use crate::grid::{Grid, GridItem};
-use crate::significance::{ALPHA, SwapMethod, mcnemar, swap_test};
+use crate::significance::{ALPHA, PValues, SwapMethod, least_p, mcnemar, swap_test};
 use darkqa_ground::types::Family;
 use darkqa_statistics::quantiles::{degrees_of_freedom, quantile, two_sided_tail};
 use darkqa_statistics::residuals::{residuals, unknown_design_effect, variance_of_few};
@@ -50,6 +50,15 @@ impl PairedComparison {
         })
     }
 
+    /// p-values before correction.
+    pub(super) fn p_values(&self) -> PValues {
+        PValues {
+            p: self.p,
+            if_answered: self.p_if_answered,
+            least: least_p(self.clusters),
+        }
+    }
+
     /// Compares two subjects on the items for which `has` is true; it takes the index of an item and the item.
     pub fn on_items(
         grid: &Grid<'_>,
@@ -94,7 +103,7 @@ impl PairedComparison {
                 }
                 [None, None] => {}
                 _ if results.iter().all(|result| result.is_asked()) => {
-                    let [lowest, highest] = net_bounds(counts);
+                    let [lowest, highest] = net_bounds([counts].into_iter());
                     sums.add_missing(item.cluster, lowest, highest);
                 }
                 _ => {}
@@ -117,14 +126,34 @@ impl PairedComparison {
     }
 }
 
-/// Smallest and largest net difference of two replies of which some are missing: a missing reply may have counted or not.
-pub(super) fn net_bounds(counts: [Option<bool>; 2]) -> [i64; 2] {
-    let [first, second] = counts;
+/// Smallest and largest sum of net differences over pairs of replies: a missing reply may have counted or not. A pair without any reply
+/// counts as equal.
+pub(super) fn net_bounds(pairs: impl Iterator<Item = [Option<bool>; 2]>) -> [i64; 2] {
     let value = |counts: Option<bool>, if_missing: bool| i64::from(counts.unwrap_or(if_missing));
-    [
-        value(first, false) - value(second, true),
-        value(first, true) - value(second, false),
-    ]
+    pairs
+        .filter(|sides| sides.iter().any(Option::is_some))
+        .fold([0, 0], |[lowest, highest], [first, second]| {
+            [
+                lowest + value(first, false) - value(second, true),
+                highest + value(first, true) - value(second, false),
+            ]
+        })
+}
+
+/// Difference and p-value that hold for all values of the missing replies, from those of the replies and those of the two bounds, the lowest
+/// difference first. The interval covers all three. p is the largest of the three, or 1 if the bounds differ in sign.
+pub(super) fn bounded(
+    (difference, p): (Estimate, f64),
+    bounds: [(Estimate, f64); 2],
+) -> (Estimate, f64) {
+    let [lowest, highest] = bounds;
+    let has_one_sign = highest.0.value < 0.0 || lowest.0.value > 0.0;
+    let p = if has_one_sign {
+        p.max(lowest.1).max(highest.1)
+    } else {
+        1.0
+    };
+    (difference.covering([lowest.0, highest.0]), p)
 }
 
 /// Differences of the items of a comparison, summed by cluster. Items with missing replies have bounds in place of a difference.
@@ -231,8 +260,8 @@ pub(crate) struct ClusterNet {
 /// exact one of swapping the two sides in whole clusters ([`swap_test`]). The test is therefore valid for any number of clusters. The
 /// interval contains all differences that the test does not reject: if only the swap test does not reject 0, it is extended to 0.
 ///
-/// With missing replies ([`BoundedSums`]), the difference is that of the replies, the interval covers those of both bounds, and p is the
-/// largest of the three, or 1 if the bounds differ in sign: a difference is detected only if no values of the missing replies undo it.
+/// With missing replies ([`BoundedSums`]), interval and p hold for all values of them ([`bounded`]): a difference is detected only if none
+/// of these values undoes it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PairedTest {
     pub(super) difference: Estimate,
@@ -274,16 +303,13 @@ impl PairedTest {
 
     /// The test with the bounds of its missing replies, the lowest difference first.
     fn bounded(self, [lowest, highest]: [Self; 2]) -> Self {
-        let has_one_sign = highest.difference.value < 0.0 || lowest.difference.value > 0.0;
+        let (difference, p) = bounded(
+            (self.difference, self.p),
+            [lowest, highest].map(|bound| (bound.difference, bound.p)),
+        );
         Self {
-            difference: self
-                .difference
-                .covering([lowest.difference, highest.difference]),
-            p: if has_one_sign {
-                self.p.max(lowest.p).max(highest.p)
-            } else {
-                1.0
-            },
+            difference,
+            p,
             p_if_answered: self.p.min(lowest.p).min(highest.p),
             ..self
         }
@@ -337,9 +363,9 @@ pub const POWER: f64 = 0.8;
 ///
 /// One pair is added in each direction, so that few or no discordant pairs do not look like certainty. Here the variance between clusters,
 /// which is the sum of their squared [`residuals`] ([`variance_of_few`] for few clusters), replaces that of independent pairs, and
-/// Student's quantile replaces the normal one. If clusters vary more than independent pairs would, the degrees of freedom are those of their
-/// residuals ([`degrees_of_freedom`]), otherwise the number of clusters minus 1. If all pairs have the same difference, usually 0, the variance of the two added pairs is multiplied by
-/// [`unknown_design_effect`], because differences that are concentrated in few clusters may all have been missed.
+/// Student's quantile replaces the normal one. If clusters vary more than independent pairs would, the degrees of freedom follow from the
+/// residuals ([`degrees_of_freedom`]), otherwise the number of clusters minus 1. If all pairs have the same difference, usually 0, the
+/// variance of the two added pairs is multiplied by [`unknown_design_effect`], because differences that are concentrated in few clusters may all have been missed.
 ///
 /// `clusters` lists, for each cluster, the sum of the differences of its pairs (of scores between 0 and 1) and their number; `squares` is
 /// the sum of the squared differences of all pairs, and `n` the number of all pairs.

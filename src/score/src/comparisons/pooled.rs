@@ -12,14 +12,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use rayon::prelude::*;
 
 use super::comparison::compares_enhancers;
-use super::holm_of;
 use super::paired::BoundedSums;
 use super::pooled_kind::PooledKind;
 use crate::accuracies::{Coverage, Lacking, shared};
 use crate::choice::ParsingMode;
 use crate::grid::{Grid, TrialResult};
 use crate::model_in_condition::{ModelInCondition, pooled_models};
-use crate::significance::{CorrectedP, Significance, least_p};
+use crate::significance::{PValues, Significance, least_p};
 use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{AxisLevel, EnhancerName, Family, Variant, View};
 
@@ -530,32 +529,26 @@ fn difference(
 
 /// Fills in the verdicts of the findings of one set, after Holm's correction.
 fn corrected(mut set: Vec<PooledFinding>) -> Vec<PooledFinding> {
-    let least = holm_of(set.iter().map(|finding| finding.least_p));
     let [strict, lenient] = ParsingMode::ALL.map(|mode| {
-        [
-            holm_of(set.iter().map(|finding| finding.parsed(mode).p)),
-            holm_of(set.iter().map(|finding| finding.parsed(mode).p_if_answered)),
-        ]
+        let tests = set.iter().map(|finding| PValues {
+            p: finding.parsed(mode).p,
+            if_answered: finding.parsed(mode).p_if_answered,
+            least: finding.least_p,
+        });
+        PValues::corrected(&tests.collect::<Vec<PValues>>())
     });
     let levels = set.len();
     for (index, finding) in set.iter_mut().enumerate() {
         finding.levels = levels;
-        finding.least_holm = least[index];
+        finding.least_holm = strict[index].least;
         let kind = finding.kind;
-        for (parsed, [holm, if_answered]) in [
-            (&mut finding.strict, &strict),
-            (&mut finding.lenient, &lenient),
+        for (parsed, corrected) in [
+            (&mut finding.strict, strict[index]),
+            (&mut finding.lenient, lenient[index]),
         ] {
-            parsed.holm = holm[index];
+            parsed.holm = corrected.p;
             let gain = kind.gain(parsed.difference.value);
-            parsed.verdict = Significance::new(
-                gain,
-                CorrectedP {
-                    p: holm[index],
-                    if_answered: if_answered[index],
-                    least: least[index],
-                },
-            );
+            parsed.verdict = Significance::new(gain, corrected);
         }
     }
     set

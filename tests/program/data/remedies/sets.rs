@@ -34,6 +34,13 @@ fn classes(bench: &Bench, count: u8) {
     }
 }
 
+/// Photographs, and questions about them without options and answers.
+fn unanswered(bench: &Bench) {
+    photographs(bench);
+    let rows = ["question,image", "Is it red?,1.png", "Is it blue?,2.png"];
+    set(bench, "q.csv", &rows);
+}
+
 /// A set of the lines of a file, with its images.
 fn set(bench: &Bench, name: &str, lines: &[&str]) {
     for (number, shade) in [(1, 100), (2, 40)] {
@@ -301,14 +308,7 @@ pub(super) const ROWS: &[Remedy] = &[
     },
     Remedy {
         says: "asks questions without answers about every image",
-        state: |bench| {
-            photographs(bench);
-            set(
-                bench,
-                "q.csv",
-                &["question,image", "Is it red?,1.png", "Is it blue?,2.png"],
-            );
-        },
+        state: unanswered,
         command: CHECK,
         printed: "--ask FILE asks",
         followed: "check --model random --levels L0 --data set --ask bank.jsonl",
@@ -316,14 +316,7 @@ pub(super) const ROWS: &[Remedy] = &[
     },
     Remedy {
         says: "asks questions without answers about every image",
-        state: |bench| {
-            photographs(bench);
-            set(
-                bench,
-                "q.csv",
-                &["question,image", "Is it red?,1.png", "Is it blue?,2.png"],
-            );
-        },
+        state: unanswered,
         command: "check --model random --levels L0 --data set/q.csv",
         printed: "--ask FILE asks",
         followed: "check --model random --levels L0 --data set/q.csv --ask bank.jsonl",

@@ -3,13 +3,12 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-use super::super::holm_of;
 use super::super::paired::{BoundedSums, PairedTest, net_bounds};
 use crate::choice::ParsingMode;
 use crate::estimate::Estimate;
 use crate::grid::Grid;
 use crate::model_in_condition::ModelInCondition;
-use crate::significance::{ALPHA, CorrectedP, Significance, SwapMethod, least_p};
+use crate::significance::{ALPHA, PValues, Significance, SwapMethod, least_p};
 use darkqa_ground::types::{AxisLevel, Variant};
 
 /// Accuracies of one model, on the items that all models answered.
@@ -123,15 +122,9 @@ impl ItemScores {
             .sum()
     }
 
-    /// Smallest and largest sum of differences over pairs of a model and a level. A pair without any reply counts as equal.
+    /// Smallest and largest sum of differences over pairs of a model and a level ([`net_bounds`]).
     fn net_bounds(&self, pairs: impl Iterator<Item = [(usize, usize); 2]>) -> [i64; 2] {
-        pairs
-            .map(|sides| sides.map(|(model, level)| self.right[model][level]))
-            .filter(|sides| sides.iter().any(Option::is_some))
-            .map(net_bounds)
-            .fold([0, 0], |sum, bounds| {
-                [sum[0] + bounds[0], sum[1] + bounds[1]]
-            })
+        net_bounds(pairs.map(|sides| sides.map(|(model, level)| self.right[model][level])))
     }
 }
 
@@ -382,17 +375,15 @@ impl Scores {
                 });
             }
         }
-        let corrected = holm_of(pairs.iter().map(|pair| pair.p));
-        let if_answered = holm_of(pairs.iter().map(|pair| pair.p_if_answered));
-        let least = pairs.len() as f64 * least_p(self.clusters());
-        for (pair, (p, if_answered)) in pairs.iter_mut().zip(corrected.into_iter().zip(if_answered))
-        {
-            pair.holm = p;
-            let corrected = CorrectedP {
-                p,
-                if_answered,
-                least,
-            };
+        let least = least_p(self.clusters());
+        let tests = pairs.iter().map(|pair| PValues {
+            p: pair.p,
+            if_answered: pair.p_if_answered,
+            least,
+        });
+        let corrected = PValues::corrected(&tests.collect::<Vec<PValues>>());
+        for (pair, corrected) in pairs.iter_mut().zip(corrected) {
+            pair.holm = corrected.p;
             pair.significance = Significance::new(pair.difference.value, corrected);
         }
         pairs

@@ -2,6 +2,7 @@
 
 use super::{PooledFinding, PooledItem, PooledSet, PooledState, SideCounts, items};
 use crate::choice::ParsingMode;
+use crate::comparisons::paired::bounded;
 use crate::comparisons::pooled_kind::PooledKind;
 use crate::estimate::Estimate;
 use crate::grid::Grid;
@@ -126,7 +127,16 @@ fn contrast(
             [Missing::Lowest, Missing::Highest],
             [Missing::Highest, Missing::Lowest],
         ];
-        replied.bounded(bounds.map(|missing| test(Some(missing))))
+        let tests = bounds.map(|missing| test(Some(missing)));
+        let (difference, p) = bounded(
+            (replied.difference, replied.p),
+            tests.map(|bound| (bound.difference, bound.p)),
+        );
+        ContrastTest {
+            difference,
+            p,
+            ..replied
+        }
     });
     Some(FamilyContrast {
         variant: most.variant.clone(),
@@ -144,24 +154,6 @@ fn contrast(
 enum Missing {
     Lowest,
     Highest,
-}
-
-impl ContrastTest {
-    /// The test with the bounds of its missing replies, as of a paired difference.
-    fn bounded(self, [lowest, highest]: [Self; 2]) -> Self {
-        let has_one_sign = highest.difference.value < 0.0 || lowest.difference.value > 0.0;
-        Self {
-            difference: self
-                .difference
-                .covering([lowest.difference, highest.difference]),
-            p: if has_one_sign {
-                self.p.max(lowest.p).max(highest.p)
-            } else {
-                1.0
-            },
-            ..self
-        }
-    }
 }
 
 /// Pairs that are added to the sample of each family, as to that of a single difference.

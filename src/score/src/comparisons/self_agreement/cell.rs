@@ -12,7 +12,7 @@ use crate::bootstrap::Resamples;
 use crate::choice::ParsingMode;
 use crate::estimate::ClusterCount;
 use crate::estimate::Estimate;
-use crate::grid::{Grid, TrialResult};
+use crate::grid::Grid;
 use crate::model_in_condition::ModelInCondition;
 use darkqa_ground::types::{AxisLevel, Family, View};
 
@@ -107,11 +107,11 @@ pub(super) fn cells(
                 family,
                 mode,
             };
-            let mut cell = part.cell(bank, &counts);
+            let failed = grid.failed(subject, family);
+            let mut cell = part.cell(bank, &counts, &failed);
             cell.informative = informative_grid.accuracy(subject, family, mode);
             if cell.role() == CellRole::Other {
                 let bounds = Bounds::new(grid, &cell.subject, family, mode, draws);
-                let failed = grid.failed(subject, family);
                 let share = bounds.map(|bounds| evidence(&counts, &failed, &bounds, draws));
                 cell.evidence = share.transpose();
             }
@@ -133,12 +133,10 @@ struct CellItems<'g, 'r> {
 
 impl CellItems<'_, '_> {
     /// Computes the cell, except the fields that depend on other cells.
-    fn cell(&self, bank: &BankIndex<'_>, counts: &[ClusterCount]) -> AgreementCell {
+    fn cell(&self, bank: &BankIndex<'_>, counts: &[ClusterCount], failed: &[u32]) -> AgreementCell {
         let (grid, subject, mode) = (self.grid, self.subject, self.mode);
-        let agreement = Estimate::with_missing(counts, &grid.failed(subject, self.family));
+        let agreement = Estimate::with_missing(counts, failed);
         let answers = BankCounts::new(grid, subject, self.family, mode, bank);
-        let items = grid.family_items(subject, self.family);
-        let failed = items.filter(|(_, result)| *result == TrialResult::Failed);
         AgreementCell {
             subject: grid.subjects[subject].clone(),
             family: self.family.cloned(),
@@ -150,7 +148,7 @@ impl CellItems<'_, '_> {
             evidence: None,
             unread: self.share(|chosen, _| chosen.is_none()),
             refused: self.refused(),
-            failed: failed.count(),
+            failed: failed.iter().map(|count| *count as usize).sum(),
             cannot_tell: self.cannot_tell(),
         }
     }

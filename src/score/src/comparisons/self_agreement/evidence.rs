@@ -1,7 +1,7 @@
 //! Share of the image's influence on a model that is left in a condition ([`evidence`]), and the exposure drop at which half of it is lost
 //! ([`EvidenceCurve`]).
 
-use crate::accuracies::CurvePoints;
+use crate::accuracies::{CurvePoints, Floor};
 use crate::bootstrap::Resamples;
 use crate::choice::ParsingMode;
 use crate::comparisons::paired::difference;
@@ -215,18 +215,15 @@ pub(super) fn curves(grid: &Grid<'_>, draws: &Resamples) -> Vec<EvidenceCurve> {
                         .clone()
                         .map(|(_, subject)| grid.failed(*subject, None))
                         .collect();
-                    let floor_share = share(&bounds.blind).unwrap_or(0.0);
+                    let floor = Floor::of_blind(&bounds.blind, &bounds.again, &missing[0])?;
                     let counts = LevelCounts {
                         levels: subjects.clone().map(|(level, _)| *level).collect(),
                         counts: subjects
                             .map(|(_, subject)| grid.counts(*subject, None, mode))
                             .collect(),
-                        guesses: floor(&bounds),
-                        missing_guesses: missing[0]
-                            .iter()
-                            .map(|missing| (f64::from(*missing) * floor_share) as f32)
-                            .collect(),
                         missing,
+                        guesses: floor.replies,
+                        missing_guesses: floor.missing,
                     };
                     let summary = counts.summary(draws)?;
                     summary.threshold.map_err(NoHalf::Curve)
@@ -240,22 +237,6 @@ pub(super) fn curves(grid: &Grid<'_>, draws: &Resamples) -> Vec<EvidenceCurve> {
                 enhancer: points.enhancer,
             })
         })
-        .collect()
-}
-
-/// Number of agreeing items without an image by cluster, scaled to the number of replies at L0.
-fn floor(bounds: &Bounds) -> Vec<f32> {
-    let [again, blind] = [&bounds.again, &bounds.blind].map(|counts| {
-        counts
-            .iter()
-            .map(|count| f64::from(count.replies))
-            .sum::<f64>()
-    });
-    let scale = again / blind;
-    bounds
-        .blind
-        .iter()
-        .map(|count| (f64::from(count.right) * scale) as f32)
         .collect()
 }
 
