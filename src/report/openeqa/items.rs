@@ -9,7 +9,7 @@ use crate::report::page::data::{
     UNREAD, levels, packed_by, shortened, sizes, thumbnails,
 };
 use crate::text::words;
-use crate::types::{AxisLevel, View};
+use crate::types::AxisLevel;
 use darkqa_score::model_in_condition;
 use darkqa_score::open::{AnswerOutcome, Group};
 
@@ -113,22 +113,7 @@ fn subject_data<'a>(
         all.iter()
             .position(|other| other.matches_up_to_group(&clean))
     });
-    ModelInCondition {
-        name: words::name(subject),
-        model: &subject.model,
-        condition: subject.condition(),
-        light: match subject.view {
-            Some(View::Blind) => "blind".to_owned(),
-            _ => words::light(&subject.variant, subject.enhancer.as_ref()),
-        },
-        level: subject.level,
-        variant: subject.variant.to_string(),
-        enhancer: subject
-            .enhancer
-            .as_ref()
-            .map(crate::types::EnhancerName::as_str),
-        clean,
-    }
+    ModelInCondition::new(subject, clean)
 }
 
 /// Answers by subject, with one item for each question; if several people answered a question, each answer is an item of its own.

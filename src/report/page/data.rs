@@ -11,8 +11,10 @@ use serde::Serialize;
 use serde_json::Value;
 
 use crate::error::{Error, Result};
+use crate::text::words;
 use crate::types::questions::PixelBox;
-use crate::types::{Axis, AxisLevel, FrameId, ObjectCrop, Thumbnail};
+use crate::types::{Axis, AxisLevel, EnhancerName, FrameId, ObjectCrop, Thumbnail, View};
+use darkqa_score::model_in_condition;
 
 /// Result code of a reply that could not be parsed. Smaller codes are choice indices or marks of the judge ([`PageKind`]).
 pub(in crate::report) const UNREAD: u8 = 26;
@@ -104,6 +106,8 @@ pub(in crate::report) struct PageData<'a> {
 pub(in crate::report) struct ModelInCondition<'a> {
     pub(in crate::report) name: String,
     pub(in crate::report) model: &'a str,
+    /// True if the model is a reference and not under test.
+    pub(in crate::report) reference: bool,
     pub(in crate::report) condition: String,
     /// Display text of variant and enhancer; `blind` without images.
     pub(in crate::report) light: String,
@@ -112,6 +116,29 @@ pub(in crate::report) struct ModelInCondition<'a> {
     pub(in crate::report) enhancer: Option<&'a str>,
     /// Index of the subject with the same model at L0 and no enhancer; `None` if it does not exist.
     pub(in crate::report) clean: Option<usize>,
+}
+
+impl<'a> ModelInCondition<'a> {
+    /// A subject as the script needs it.
+    pub(in crate::report) fn new(
+        subject: &'a model_in_condition::ModelInCondition,
+        clean: Option<usize>,
+    ) -> Self {
+        Self {
+            name: words::name(subject),
+            model: &subject.model,
+            reference: subject.is_reference(),
+            condition: subject.condition(),
+            light: match subject.view {
+                Some(View::Blind) => "blind".to_owned(),
+                _ => words::light(&subject.variant, subject.enhancer.as_ref()),
+            },
+            level: subject.level,
+            variant: subject.variant.to_string(),
+            enhancer: subject.enhancer.as_ref().map(EnhancerName::as_str),
+            clean,
+        }
+    }
 }
 
 #[derive(Serialize)]

@@ -11,7 +11,7 @@ use super::sample::sample;
 use crate::error::Result;
 use crate::text::outcome_words;
 use crate::text::words::family;
-use crate::types::{AxisLevel, FailureKind, QuestionId, RunQuestion, TrialRef, UnreadReason, View};
+use crate::types::{AxisLevel, FailureKind, QuestionId, RunQuestion, TrialRef, UnreadReason};
 use darkqa_score::answers::confusion;
 use darkqa_score::choice::ParsingMode;
 use darkqa_score::grid::{Grid, TrialResult};
@@ -137,22 +137,7 @@ fn code(result: TrialResult, mode: ParsingMode) -> u8 {
 fn subjects<'a>(grid: &'a Grid<'_>) -> Vec<ModelInCondition<'a>> {
     grid.subjects
         .iter()
-        .map(|subject| ModelInCondition {
-            name: crate::text::words::name(subject),
-            model: &subject.model,
-            condition: subject.condition(),
-            light: match subject.view {
-                Some(View::Blind) => "blind".to_owned(),
-                _ => crate::text::words::light(&subject.variant, subject.enhancer.as_ref()),
-            },
-            level: subject.level,
-            variant: subject.variant.to_string(),
-            enhancer: subject
-                .enhancer
-                .as_ref()
-                .map(crate::types::EnhancerName::as_str),
-            clean: clean_index(grid, subject),
-        })
+        .map(|subject| ModelInCondition::new(subject, clean_index(grid, subject)))
         .collect()
 }
 

@@ -86,9 +86,9 @@ const both = (s, i) => there() >= 0 && chosen(s, i) < FAILED && chosen(there(), 
 const isFirstLost = (s, i) => {
   const here = data.subjects[s];
   if (here.level === null || here.level === "L0" || chosen(s, i) >= FAILED || isRight(s, i)) return false;
-  const before = levels(here.model, here.light);
-  const earlier = before.slice(0, before.indexOf(here.level)).map((level) => at(here.model, here.light, level));
-  return earlier.length > 0 && earlier.every((subject) => subject >= 0 && isRight(subject, i));
+  const before = everyLevel().slice(0, everyLevel().indexOf(here.level));
+  const earlier = before.map((level) => at(here.model, here.light, level)).filter((subject) => subject >= 0);
+  return earlier.length > 0 && earlier.every((subject) => isRight(subject, i));
 };
 
 const STATES = {
@@ -134,19 +134,26 @@ const familyWords = (name) => data.families.find(([own]) => own === name)?.[1] ?
 const everyLevel = () => data.levels.map(([name]) => name);
 const severity = (level) => data.levels.find(([name]) => name === level)[1];
 const lights = (model) => unique(data.subjects.filter((s) => s.model === model).map((s) => s.light));
-const levels = (model, light) => {
-  const there = data.subjects.filter((s) => s.model === model && s.light === light && s.level).map((s) => s.level);
-  return unique([...(there.length && clean(model, light) >= 0 ? ["L0"] : []), ...there]);
+// The levels at which a model was asked in some light, by darkness.
+const levels = (model, inLight) => {
+  const asked = data.subjects.filter((s) => s.model === model && inLight(s.light)).map((s) => s.level);
+  return everyLevel().filter((level) => asked.includes(level));
 };
 
-const subjectNow = () => state.light === "blind" ? find(state.model, "blind", null) : at(state.model, state.light, state.level);
+const subjectNow = () => find(state.model, state.light, state.light === "blind" ? null : state.level);
 
-const choices = () => {
+// Fills the select boxes. Not each light has each level: the one that was not just chosen follows the other.
+const choices = (changed) => {
   state.family = fill($("f-family"), ["all", ...data.families.map(([name]) => name)], state.family, familyWords);
   state.model = fill($("f-model"), unique(data.subjects.map((s) => s.model)), state.model);
   state.light = fill($("f-light"), lights(state.model), state.light);
-  const there = levels(state.model, state.light);
-  state.level = there.length ? fill($("f-level"), there, state.level) : (fill($("f-level"), ["–"]), null);
+  const within = (light) => levels(state.model, (own) => own === light);
+  if (state.light !== "blind" && !within(state.light).includes(state.level)) {
+    const other = changed === "light" ? undefined : lights(state.model).find((light) => within(light).includes(state.level));
+    if (other !== undefined) state.light = fill($("f-light"), lights(state.model), other);
+    else state.level = within(state.light).at(-1);
+  }
+  if (state.light === "blind") { fill($("f-level"), ["–"]); state.level = null; } else fill($("f-level"), levels(state.model, () => true), state.level);
   state.against = fill($("f-against"), ["–", ...data.subjects.map((s) => s.name)], state.against);
   const states = Object.keys(STATES).filter((name) => state.against !== "–" || !name.endsWith(" there"));
   state.show = fill($("f-state"), states, state.show);
@@ -216,8 +223,8 @@ const link = () => {
 let hasActed = false;
 const acted = () => { hasActed = true; };
 
-const refresh = () => {
-  choices();
+const refresh = (changed) => {
+  choices(changed);
   select();
   $("list").replaceChildren();
   drawn = 0;
@@ -418,11 +425,11 @@ const start = async () => {
   $("i-key").textContent = isOpen()
     ? "Marks of the judge from 1 to 5 (0: no answer) · ? not marked · ! not answered; a click shows the answer and what the judge said"
     : `${hasTruth() ? "✓ right · ✗ wrong" : `= ${SAME} · ≠ ${OTHER}`} · ? not read · ! failed; the letter is the choice that was read; a click shows the reply`;
-  const first = data.subjects.find((s) => s.light !== "blind") || data.subjects[0];
+  const first = data.subjects.find((s) => s.light !== "blind" && !s.reference) || data.subjects.find((s) => s.light !== "blind") || data.subjects[0];
   state = { family: "all", model: first?.model, light: undefined, level: undefined, against: "–", show: "all", words: "", item: data.items.length ? 0 : null, pictured: null };
   $("loading").hidden = true;
   $("explorer").hidden = false;
-  const set = (key, id) => $(id).addEventListener("change", (event) => { acted(); state[key] = event.target.value; state.pictured = null; refresh(); });
+  const set = (key, id) => $(id).addEventListener("change", (event) => { acted(); state[key] = event.target.value; state.pictured = null; refresh(key); });
   set("family", "f-family"); set("model", "f-model"); set("light", "f-light"); set("level", "f-level"); set("against", "f-against"); set("show", "f-state");
   $("f-words").addEventListener("input", (event) => { acted(); state.words = event.target.value; refresh(); });
   $("next").addEventListener("click", () => step(1));
@@ -431,7 +438,7 @@ const start = async () => {
     const there = everyLevel();
     acted();
     state.pictured = there[Number(event.target.value)];
-    if (levels(state.model, state.light).includes(state.pictured)) { state.level = state.pictured; refresh(); } else { draw(); }
+    if (find(state.model, state.light, state.pictured) >= 0) { state.level = state.pictured; refresh(); } else { draw(); }
   });
   const images = $("i-images");
   images.addEventListener("wheel", (event) => {

@@ -113,9 +113,33 @@ fn count(browser: &mut Browser) -> Value {
     browser.evaluate("document.querySelector('#f-count').textContent")
 }
 
+/// Level and light of the items are those that some model was asked at: the one that was not chosen follows.
+fn level_follows_light(browser: &mut Browser) {
+    let shown = |browser: &mut Browser| {
+        browser
+            .evaluate("['level', 'light'].map(name => document.querySelector('#f-' + name).value)")
+    };
+    assert_eq!(shown(browser), json!(["L0", "untouched"]));
+    browser.choose("#f-light", "with noise");
+    assert_eq!(shown(browser), json!(["L5", "with noise"]));
+    browser.choose("#f-level", "L4");
+    assert_eq!(shown(browser), json!(["L4", "with noise"]));
+    // Nothing is asked at L0 with noise.
+    browser.choose("#f-level", "L0");
+    assert_eq!(shown(browser), json!(["L0", "untouched"]));
+    browser.choose("#f-light", "blind");
+    assert_eq!(shown(browser), json!(["–", "blind"]));
+    browser.choose("#f-light", "untouched");
+}
+
 fn filters(browser: &mut Browser) {
     let model = browser.evaluate("document.querySelector('#f-model').options[1].value");
     assert_eq!(model, SAID);
+    // The page opens at a model that is no reference.
+    let opened = browser.evaluate("document.querySelector('#f-model').value");
+    assert_eq!(opened, SAID);
+    browser.choose("#f-model", "random");
+    level_follows_light(browser);
     browser.choose("#f-model", SAID);
     assert_eq!(count(browser), "40 of 40 items");
     // The markup, the turned letters and the long reply cannot be read; everything else is right.
@@ -172,7 +196,12 @@ fn charts(browser: &mut Browser, bench: &Bench) {
     browser.evaluate("document.querySelector('#models button[title=random]').click()");
     assert_eq!(
         browser.evaluate(&rows),
-        json!(["random", SAID, "random without images", "chance"])
+        json!([
+            SAID,
+            "random (reference)",
+            "random without images",
+            "chance"
+        ])
     );
     let csv = std::fs::read_to_string(bench.path("run/summary.csv")).unwrap();
     let csv: Vec<Vec<&str>> = csv.lines().map(|line| line.split(',').collect()).collect();
@@ -182,7 +211,7 @@ fn charts(browser: &mut Browser, bench: &Bench) {
             "(() => {{ const s = {first}.querySelector('.cursor input'); s.value = {place}; s.dispatchEvent(new Event('input')); }})()"
         ));
         let cell = format!(
-            "{first}.querySelector('.values tbody tr[data-line=random] td:last-child').textContent"
+            "{first}.querySelector('.values tbody tr[data-line^=random] td:last-child').textContent"
         );
         let shown = browser.evaluate(&cell);
         let kind = if level == "L0" { "none" } else { "noise" };
