@@ -1,6 +1,6 @@
 //! Table of the similarity of images to their clean frames, and of how well it predicts right answers.
 
-use crate::text::table::ColumnKind::{Count, Number, P, Percent, Ratio, Significance, Text};
+use crate::text::table::ColumnKind::{Count, Number, P, Percent, Ratio, Text};
 use crate::text::table::{Table, TableBuilder, TableCell};
 use crate::text::words::light;
 use crate::types::View;
@@ -60,11 +60,7 @@ pub(super) fn fidelity(findings: Option<&FidelityFindings>) -> Option<Table> {
                 P,
                 &*format!("csv {csv}_p_holm | page p (Holm)"),
                 move |row| row.predicts[index].map(|prediction| prediction.holm),
-            )
-            // No sentence is about a single condition, so there is no verdict.
-            .column(Significance, &*format!("csv {csv}_verdict"), |_| {
-                TableCell::Blank
-            });
+            );
     }
     let mut table = table.build();
     table.is_folded = true;

@@ -1,6 +1,7 @@
 //! Alerts at the top of a report: problems of its runs, differences between them, and limitations of its numbers ([`alerts`]).
 
 mod adapted;
+mod clusters;
 mod confidence;
 mod constraints;
 mod images;
@@ -20,24 +21,22 @@ mod words;
 pub(super) use missing::missing_alerts;
 pub(super) use replies::empty_answer_alerts;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
-use super::combine::{Combined, frame_ties};
+use super::combine::Combined;
 use super::enhancers::enhancer_alerts;
 use super::join::{Joined, JoinedRun};
 use crate::runs::over_budget::OverBudget;
 use crate::text::alert::{Alert, AlertKind};
 use crate::types::manifests::Status;
-use crate::types::text::{counted, plural};
-use crate::types::{Digest, FrameId, InputSummary, OpenDetail, StoredDetail as _, TrialRef};
+use crate::types::text::plural;
+use crate::types::{InputSummary, OpenDetail, StoredDetail as _, TrialRef};
 use darkqa_score::answers::record::Detail;
-use darkqa_score::cluster::{ClusterUnit, MIN_CLUSTERS};
-use darkqa_score::comparisons::compares_models;
 use darkqa_score::comparisons::self_agreement::SelfAgreement;
+use darkqa_score::comparisons::{compares_enhancers, compares_models};
 use darkqa_score::findings::Findings;
 use darkqa_score::photographs::PhotographedSet;
 use darkqa_score::photographs::pair_darkness::PairDarkness;
-use darkqa_score::suggested_scenes::SuggestedScenes;
 
 /// All alerts of a report on multiple-choice questions, ordered by kind.
 pub(super) fn alerts(combined: &Combined, findings: &Findings<'_>) -> Vec<Alert> {
@@ -66,13 +65,15 @@ pub(super) fn alerts(combined: &Combined, findings: &Findings<'_>) -> Vec<Alert>
     alerts.extend(questions::repeat_alert(combined));
     alerts.extend(questions::item_alerts(findings));
     alerts.extend(questions::balance_alert(findings));
-    alerts.extend(cluster_alerts(
+    alerts.extend(clusters::cluster_alerts(
         combined,
         findings.grid.clusters,
         findings.unit,
     ));
+    alerts.extend(clusters::rare_loss_alert(findings));
     alerts.extend(dark_photographs_alert(findings.set));
     alerts.extend(many_models_alert(findings));
+    alerts.extend(many_enhancers_alert(findings));
     alerts.extend(
         findings
             .pairs
@@ -104,7 +105,7 @@ pub(super) fn alerts_without_truths(
         &combined.runs,
         &combined.trials,
     ));
-    alerts.extend(cluster_alerts(
+    alerts.extend(clusters::cluster_alerts(
         combined,
         agreement.grid.clusters,
         agreement.unit,
@@ -140,85 +141,15 @@ fn many_models_alert(findings: &Findings<'_>) -> Option<Alert> {
     (!compares_models(&findings.grid)).then(|| Alert::new(AlertKind::Models, text))
 }
 
+/// Alert for a report with too many enhancers for pairwise comparisons.
+fn many_enhancers_alert(findings: &Findings<'_>) -> Option<Alert> {
+    let text = "Too many enhancers to compare them with each other: no pair of them is tested. Reports of fewer enhancers do so.";
+    (!compares_enhancers(&findings.grid)).then(|| Alert::new(AlertKind::Models, text))
+}
+
 /// Alert for a set of photographs that were taken in the dark.
 fn dark_photographs_alert(set: PhotographedSet) -> Option<Alert> {
     set.notice().map(|text| Alert::new(AlertKind::Pairs, text))
-}
-
-/// Alerts about few clusters, copies of a picture, a single frame or scene, and missing scenes. Without replies, the number of clusters is
-/// 0 and gets no alert.
-fn cluster_alerts(combined: &Combined, clusters: usize, unit: ClusterUnit) -> Vec<Alert> {
-    let frames: BTreeSet<&FrameId> = combined.questions.iter().map(|one| &one.frame).collect();
-    let few_clusters = if clusters == 0 {
-        None
-    } else if clusters < MIN_CLUSTERS {
-        Some(format!(
-            "Only {} ({MIN_CLUSTERS} are needed): wide intervals, few possible verdicts.",
-            counted(clusters, &unit.to_string())
-        ))
-    } else if frames.len() == 1 {
-        let text = "Only 1 frame: intervals and tests are by question, and say nothing about other frames.";
-        Some(text.to_owned())
-    } else {
-        None
-    };
-    few_clusters
-        .into_iter()
-        .chain(copies(combined, &frames))
-        .chain(named_scenes(combined, &frames))
-        .map(|text| Alert::new(AlertKind::Clusters, text))
-        .collect()
-}
-
-/// Sentence about frames that show the same picture; `None` if all pictures differ. A frame without a known digest counts as a picture.
-fn copies(combined: &Combined, frames: &BTreeSet<&FrameId>) -> Option<String> {
-    let digests = frame_ties(&combined.questions).digests;
-    let pictures: BTreeSet<&Digest> = digests.values().collect();
-    let pictures = pictures.len() + frames.len() - digests.len();
-    (pictures < frames.len()).then(|| {
-        format!(
-            "{} show {}: equal pictures count as one frame.",
-            counted(frames.len(), "frame"),
-            counted(pictures, "different picture")
-        )
-    })
-}
-
-/// Sentence about scenes: if no question has one, but the frame names suggest some; if only some frames have one; or if all frames have the
-/// same one.
-fn named_scenes(combined: &Combined, frames: &BTreeSet<&FrameId>) -> Option<String> {
-    let scenes: BTreeMap<&FrameId, &String> = combined
-        .questions
-        .iter()
-        .filter(|one| !one.scene.is_empty())
-        .map(|one| (&one.frame, &one.scene))
-        .collect();
-    if scenes.is_empty() {
-        let suggested = SuggestedScenes::new(frames.iter().copied())?;
-        return Some(format!(
-            "{}: intervals may be too narrow. Give each question a \"scene\" and repeat the run's command; nothing is asked again.",
-            suggested.sentence()
-        ));
-    }
-    let without = frames.len() - scenes.len();
-    if without > 0 {
-        let count = if without == 1 {
-            "counts as a scene"
-        } else {
-            "count as scenes"
-        };
-        return Some(format!(
-            "{without} of {} have no scene and {count} of their own.",
-            counted(frames.len(), "frame")
-        ));
-    }
-    let names: BTreeSet<&String> = scenes.into_values().collect();
-    (names.len() == 1 && frames.len() > 1).then(|| {
-        format!(
-            "All {} frames are of one scene and count as independent: the results are about this scene alone. Take more scenes.",
-            frames.len()
-        )
-    })
 }
 
 /// Alerts about the runs themselves, for multiple-choice and open-ended questions: from manifests, questions and trials, not from scores.

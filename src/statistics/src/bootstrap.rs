@@ -12,6 +12,9 @@ const SEED: u64 = 0x6461_726b_7161;
 /// Maximum number of units that are drawn (chosen): the standard error then has a relative error of 1 %. With more clusters, a unit is a
 /// group of clusters, so that time and memory do not grow further.
 const MAX_UNITS: usize = 8192;
+/// Minimum number of units for an interval of percentiles alone (chosen). With 5 units they held 92.5 % of true thresholds, with the
+/// interval of Student's t 96.6 %.
+const MIN_PERCENTILE_UNITS: usize = 8;
 
 /// Draws of all clusters with replacement. Every statistic uses the same draws, so that differences are paired.
 ///
@@ -117,7 +120,8 @@ impl Resamples {
     /// The 95 % interval of a statistic from its values in the draws, which may be infinite.
     ///
     /// The ends are percentiles, widened for few clusters by Student's distribution (Hesterberg 2015, Am. Stat. 69:371,
-    /// section 5.3, "expanded percentile").
+    /// section 5.3, "expanded percentile"). The draws of fewer than [`MIN_PERCENTILE_UNITS`] units have no values far enough out, so
+    /// that the interval also covers that of Student's t with the standard deviation of the finite values.
     #[must_use]
     pub fn interval(&self, mut values: Vec<f64>) -> [f64; 2] {
         if values.is_empty() {
@@ -125,14 +129,24 @@ impl Resamples {
         }
         values.sort_by(f64::total_cmp);
         let c = self.count as f64;
-        let tail = if self.count < 2 {
-            0.0
-        } else {
-            let z = student(c - 1.0) * (c / (c - 1.0)).sqrt();
-            0.5 * libm::erfc(z / std::f64::consts::SQRT_2)
+        let ends = |tail: f64| {
+            let last = (values.len() - 1) as f64;
+            [tail, 1.0 - tail].map(|share| values[(share * last).round() as usize])
         };
-        let last = values.len() - 1;
-        [tail, 1.0 - tail].map(|share| values[(share * last as f64).round() as usize])
+        if self.count < 2 {
+            return ends(0.0);
+        }
+        let z = student(c - 1.0) * (c / (c - 1.0)).sqrt();
+        let [low, high] = ends(0.5 * libm::erfc(z / std::f64::consts::SQRT_2));
+        if self.count >= MIN_PERCENTILE_UNITS {
+            return [low, high];
+        }
+        let finite = &values[..values.partition_point(|value| value.is_finite())];
+        let n = finite.len() as f64;
+        let mean = finite.iter().sum::<f64>() / n;
+        let variance = finite.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n;
+        let half = z * variance.sqrt();
+        [low.min(mean - half), high.max(mean + half)]
     }
 }
 
@@ -178,6 +192,14 @@ mod tests {
         let half = student(29.0) * (77.5_f64 / 30.0).sqrt();
         assert!((low - (14.5 - half)).abs() < 0.25, "{low}");
         assert!((high - (14.5 + half)).abs() < 0.25, "{high}");
+        // The draws of five numbers end at 0 and 4.
+        let numbers: Vec<f32> = (0..5_u8).map(f32::from).collect();
+        let draws = Resamples::new(5);
+        let means = draws.sums(&numbers).iter().map(|sum| sum / 5.0).collect();
+        let [low, high] = draws.interval(means);
+        let half = student(4.0) * (2.5_f64 / 5.0).sqrt();
+        assert!((low - (2.0 - half)).abs() < 0.1, "{low}");
+        assert!((high - (2.0 + half)).abs() < 0.1, "{high}");
         let ends = Resamples::new(1).interval(vec![3.0, f64::INFINITY, 1.0]);
         assert!(ends[0] < 1.5 && ends[1].is_infinite());
     }

@@ -181,6 +181,27 @@ fn few_scenes_are_clusters_with_an_alert() {
 }
 
 #[test]
+fn a_scene_with_most_questions_has_an_alert() {
+    let bench = Bench::new();
+    let names = ["a", "b", "c", "d", "e", "f", "g", "h"];
+    let scenes = names.into_iter().chain(["hall"; 8]);
+    frames(&bench, (0..).zip(scenes));
+    bench.complete(&words(RUN));
+    assert_eq!(
+        cluster_alerts(&summary(&bench, "run")),
+        [
+            "Scene hall has 50 % of the questions: the results are mostly about it, and intervals may be too narrow."
+        ]
+    );
+    // Without one of them, no scene is large.
+    let bench = Bench::new();
+    let scenes = names.into_iter().chain(["hall"; 7]);
+    frames(&bench, (0..).zip(scenes));
+    bench.complete(&words(RUN));
+    assert!(cluster_alerts(&summary(&bench, "run")).is_empty());
+}
+
+#[test]
 fn frames_of_one_scene_are_clusters_with_an_alert() {
     let bench = Bench::new();
     frames(&bench, (0..12).map(|number| (number, "hall")));

@@ -78,11 +78,12 @@ fn few(shape: Shape, clusters: &[(usize, u32)]) -> Designs<'_> {
     }
 }
 
-const FEW: [(usize, u32); 8] = [
+const FEW: [(usize, u32); 9] = [
     (2, 40),
     (3, 40),
     (4, 40),
     (5, 40),
+    (6, 40),
     (7, 40),
     (8, 40),
     (12, 40),
@@ -95,7 +96,11 @@ fn the_coverage_of_few_scenes() {
     let few = few(Shape::Even, &FEW);
     few.print(["share, few scenes"], share, 1000);
     few.print(["paired difference, few scenes"], reacting, 1000);
-    few.print(["area, few scenes", "threshold, few scenes"], curve_of, 300);
+    few.print(
+        ["area, few scenes", "threshold, few scenes"],
+        curve_of,
+        1000,
+    );
 }
 
 #[test]
@@ -146,6 +151,16 @@ fn two_to_seven_scenes_are_covered() {
                 "{design:?}: {found:?}"
             );
         }
+    }
+}
+
+#[test]
+fn thresholds_of_five_to_seven_scenes_are_covered() {
+    for clusters in 5..=7 {
+        let design = design(Shape::Even, clusters, 40, 0.2);
+        let [_, threshold] = coverage(curve_of, &design, 300);
+        // With the percentiles of the bootstrap alone, 92 % of 5 scenes.
+        assert!(threshold.unwrap() > 93.0, "{design:?}: {threshold:?}");
     }
 }
 
