@@ -120,7 +120,7 @@ fn table(titles: &Titles, caption: &str, curves: &[&Curve], mode: ParsingMode) -
             |curve| curve.parsed(mode).floor,
         )
         .column(Text, "csv floor_of | terminal of | page of", |curve| {
-            floor_of(curve)
+            curve.floor.name()
         })
         .column(Text, titles.range_column, |curve| {
             format!("0–{}", curve.parsed(mode).darkest.value())
@@ -128,15 +128,6 @@ fn table(titles: &Titles, caption: &str, curves: &[&Curve], mode: ParsingMode) -
         .column(Text, "csv reason", |curve| csv_reason(curve.parsed(mode)))
         .column(Text, "csv mode", |_| mode.name())
         .build()
-}
-
-/// What the floor of a curve is the accuracy of.
-fn floor_of(curve: &Curve) -> &'static str {
-    if curve.floor_is_blind {
-        "no image"
-    } else {
-        "guessing"
-    }
 }
 
 /// Text for the reason why a curve has no threshold.

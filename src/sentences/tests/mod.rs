@@ -4,6 +4,7 @@ mod below_blind;
 mod best;
 mod claims;
 mod confidence;
+mod habit;
 mod hallucination;
 mod missing;
 mod real;

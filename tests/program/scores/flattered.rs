@@ -150,7 +150,7 @@ fn one_true_answer_is_named_and_weighted() {
         "{without_blind}"
     );
     let table = read(&bench, "o/thresholds.csv");
-    assert!(table.contains("guessing"), "{table}");
+    assert!(table.contains("common answer"), "{table}");
     // The remedy: the same command with the flag.
     bench.call(&[&RUN[..], &["--blind"]].concat()).ended(0);
     assert!(!alert(&bench).contains("--blind"), "{}", alert(&bench));

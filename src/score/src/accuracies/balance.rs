@@ -60,6 +60,11 @@ impl UnbalancedFamily {
             })
             .collect()
     }
+
+    /// True if the common answer is the true one of an item.
+    pub(super) fn is_true_of(&self, item: &GridItem<'_>) -> bool {
+        true_answer(item).as_ref() == Some(&self.answer)
+    }
 }
 
 /// The true answer of an item in lower case.

@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use super::balance::UnbalancedFamily;
 use crate::bootstrap::Resamples;
 use crate::choice::ParsingMode;
 use crate::estimate::ClusterCount;
@@ -20,12 +21,35 @@ pub struct Curve {
     pub enhancer: Option<EnhancerName>,
     /// Question family; `None` for all families together.
     pub family: Option<Family>,
-    /// True if the floor is the accuracy of the model itself without images; false if guessing is the floor.
-    pub floor_is_blind: bool,
+    /// What the floor is the accuracy of.
+    pub floor: FloorKind,
     /// Threshold and area in the strict parsing, which is the main result.
     pub summary: CurveSummary,
     /// Threshold and area in the lenient parsing.
     pub lenient: CurveSummary,
+}
+
+/// Answers that need no image: half of the distance from them to accuracy at L0 is lost at the threshold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FloorKind {
+    /// A guess among the choices.
+    Guessing,
+    /// In families of which one answer is true of most questions, but not of all, always that answer; else a guess.
+    CommonAnswer,
+    /// The model itself without images.
+    Blind,
+}
+
+impl FloorKind {
+    /// The name in tables and files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Guessing => "guessing",
+            Self::CommonAnswer => "common answer",
+            Self::Blind => "no image",
+        }
+    }
 }
 
 impl Curve {
@@ -102,9 +126,12 @@ impl CurvePoints {
 /// Computes all curves of a grid: each model in each variant, raw and with each enhancer. A curve needs L0 and at least one degraded level.
 #[must_use]
 pub fn curves(grid: &Grid<'_>, draws: &Resamples, family: Option<&Family>) -> Vec<Curve> {
+    let mut unbalanced = UnbalancedFamily::all(grid);
+    // Where one answer is true of all questions, no reply differs from it, and a threshold would not exist.
+    unbalanced.retain(|one| one.count < one.questions);
     CurvePoints::all(grid)
         .into_par_iter()
-        .filter_map(|points| curve(grid, draws, family, points))
+        .filter_map(|points| curve(grid, draws, family, &unbalanced, points))
         .collect()
 }
 
@@ -112,6 +139,7 @@ fn curve(
     grid: &Grid<'_>,
     draws: &Resamples,
     family: Option<&Family>,
+    unbalanced: &[UnbalancedFamily],
     points: CurvePoints,
 ) -> Option<Curve> {
     let subjects = &points.subjects;
@@ -120,19 +148,26 @@ fn curve(
         .map(|(_, subject)| grid.failed(*subject, family))
         .collect();
     let blind = grid.find_up_to_group(&ModelInCondition::new(&points.model, None));
-    let [(strict, floor_is_blind), (lenient, _)] = ParsingMode::ALL.map(|mode| {
+    let [(strict, floor), (lenient, _)] = ParsingMode::ALL.map(|mode| {
         let counts: Vec<Vec<ClusterCount>> = subjects
             .iter()
             .map(|(_, subject)| grid.counts(*subject, family, mode))
             .collect();
-        let guessing = Floor::of_guessing(grid, subjects[0].1, family);
+        let of_choices = |unbalanced| Floor::of_choices(grid, subjects[0].1, family, unbalanced);
+        let guessing = of_choices(&[]);
         let seeing_nothing = blind.and_then(|blind| {
             Floor::of_blind(&grid.counts(blind, family, mode), &counts[0], &missing[0])
         });
         // Only what images add can be lost in the dark; without an image the model may still be worse than a guess.
-        let floor = seeing_nothing.filter(|floor| floor.total() > guessing.total());
-        let is_blind = floor.is_some();
-        let floor = floor.unwrap_or(guessing);
+        let (floor, kind) = match seeing_nothing {
+            Some(blind) if blind.total() > guessing.total() => (blind, FloorKind::Blind),
+            Some(_) => (guessing, FloorKind::Guessing),
+            // What the model knows of the answers without an image is not known, so it is assumed to know which is common.
+            None => match of_choices(unbalanced) {
+                common if common == guessing => (guessing, FloorKind::Guessing),
+                common => (common, FloorKind::CommonAnswer),
+            },
+        };
         let levels = LevelCounts {
             levels: subjects.iter().map(|(level, _)| *level).collect(),
             counts,
@@ -140,7 +175,7 @@ fn curve(
             guesses: floor.replies,
             missing_guesses: floor.missing,
         };
-        (levels, is_blind)
+        (levels, kind)
     });
     let summary = strict.summary(draws)?;
     Some(Curve {
@@ -149,7 +184,7 @@ fn curve(
         } else {
             lenient.summary(draws)?
         },
-        floor_is_blind,
+        floor,
         summary,
         model: points.model,
         variant: points.variant,
@@ -159,6 +194,7 @@ fn curve(
 }
 
 /// Expected numbers of right replies at L0 without the image, by cluster.
+#[derive(Debug, PartialEq)]
 pub(crate) struct Floor {
     /// Among the replies.
     pub(crate) replies: Vec<f32>,
@@ -167,12 +203,29 @@ pub(crate) struct Floor {
 }
 
 impl Floor {
-    /// The floor of guessing.
-    fn of_guessing(grid: &Grid<'_>, clean: usize, family: Option<&Family>) -> Self {
-        Self {
-            replies: guesses(grid, clean, family, TrialResult::is_reply),
-            missing: guesses(grid, clean, family, |result| result == TrialResult::Failed),
+    /// The floor of an answer without the image: the common one in these unbalanced families, a guess in others.
+    fn of_choices(
+        grid: &Grid<'_>,
+        clean: usize,
+        family: Option<&Family>,
+        unbalanced: &[UnbalancedFamily],
+    ) -> Self {
+        let (mut replies, mut missing) = (vec![0.0; grid.clusters], vec![0.0; grid.clusters]);
+        for (item, result) in grid.family_items(clean, family) {
+            let of_result = match result {
+                TrialResult::Absent => continue,
+                TrialResult::Failed => &mut missing,
+                TrialResult::Read { .. } => &mut replies,
+            };
+            let common = unbalanced
+                .iter()
+                .find(|one| one.family == *item.asked.family);
+            of_result[item.cluster as usize] += match common {
+                Some(common) => f32::from(u8::from(common.is_true_of(item))),
+                None => 1.0 / item.asked.choices.len() as f32,
+            };
         }
+        Self { replies, missing }
     }
 
     /// The floor of a model that was asked without images, scaled to its number of replies at L0 (`clean`). `missing` is the number of
@@ -206,20 +259,4 @@ impl Floor {
     fn total(&self) -> f64 {
         self.replies.iter().map(|right| f64::from(*right)).sum()
     }
-}
-
-/// Expected number of right guesses among the results at L0 for which `counts` is true, by cluster.
-fn guesses(
-    grid: &Grid<'_>,
-    clean: usize,
-    family: Option<&Family>,
-    counts: impl Fn(TrialResult) -> bool,
-) -> Vec<f32> {
-    let mut guesses = vec![0.0_f32; grid.clusters];
-    for (item, result) in grid.family_items(clean, family) {
-        if counts(result) {
-            guesses[item.cluster as usize] += 1.0 / item.asked.choices.len() as f32;
-        }
-    }
-    guesses
 }

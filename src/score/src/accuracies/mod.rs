@@ -17,7 +17,7 @@ pub use chance::OfferedChoices;
 pub(super) use common::CommonItems;
 pub use common::shared_items;
 pub(super) use coverage::{Coverage, Lacking, shared};
-pub use curve::{Curve, curves};
+pub use curve::{Curve, FloorKind, curves};
 pub(super) use curve::{CurvePoints, Floor};
 pub use flips::FirstFailure;
 pub(super) use flips::first_failures;
