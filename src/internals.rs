@@ -9,8 +9,8 @@ pub mod ask {
 }
 
 pub mod dataset {
-    pub use crate::dataset::picture::Picture;
-    pub use crate::dataset::{DataPlace, Dataset, SetArgs};
+    pub use crate::data::picture::Picture;
+    pub use crate::data::{DataPlace, Dataset, SetArgs};
 }
 
 pub mod report {

@@ -77,52 +77,35 @@
 //!
 //! # The map
 //!
-//! The program is this crate. Its libraries are crates of their own, in `src/CRATE`, with names that begin with `darkqa-`. Data flows
-//! one way, and the stages do not know each other:
+//! Twelve rooms, in the order of the data. A room is a folder of `src`; a folder with a `Cargo.toml` is a crate of its own, because it
+//! needs nothing of this one and then builds beside it:
 //!
 //! ```text
-//!                            ┌──────► questions ─────────────┐            (words: what is asked)
-//! labels ► rooms ► dataset ──┤                               ├─► ask → store → score → report
-//!             import ──┘     └──────► light ──────► enhance ─┘            (light: what is seen)
-//!
-//! types, error, files = the ground    images → engine = all that is asked    runs, run_reports = what was asked    run = one folder a command    cli = words → calls
+//! base ─┬─ pictures ─┬─ data ──────────┐
+//!       ├─ light ────┤                 ├─ engine ─┐
+//!       ├─ questions ┤    enhance ─────┤          ├─ commands
+//!       ├─ ask ──────┼─────────────────┘          │
+//!       └─ score ────┴─ runs ─── report ──────────┘
 //! ```
 //!
-//! | crate | here | |
-//! |---|---|---|
-//! | `ground` | `error`, `files`, `types`, `labels` | the one error type; files read with bounds and written whole; the vocabulary; the label spaces NYU40, mpcat40, ADE150 and NYU13 |
-//! | `light` | `darkqa_light` | a clean image × a degradation → a degraded one; pure, given a noise key |
-//! | `python_light` | | the Python module `darkqa_light`: what `light` does, on arrays; the program does not use it |
-//! | `picture` | `picture` | image files with their colour profiles and orientation, maps of numbers, scaling, and images encoded for a request |
-//! | `scenes` | `rooms` | the built-in rooms, drawn by a seed with all their maps |
-//! | `questions` | `darkqa_questions` | a frame with its maps → questions with one true answer, by rule; the observer: what the rules could still answer from given pixels; and answers from maps that a network predicted |
-//! | `enhance` | `darkqa_enhance` | a degraded image → an enhanced one, by the user's ONNX model; `models` has the networks that the program carries |
-//! | `choice` | `darkqa_score::choice` | a reply → its answer without thoughts: a choice, a mark or a text |
-//! | `statistics` | `darkqa_score` | estimates with intervals, tests and thresholds of clustered replies |
-//! | `score` | `darkqa_score` | records → numbers with their intervals |
-//! | `store` | `store` | the folder of a run, `results/<run>/`: append-only and resumable |
+//! | room | |
+//! |---|---|
+//! | `base` | the one error type; files read with bounds and written whole; the label spaces NYU40, mpcat40, ADE150 and NYU13; the vocabulary of a trial. At the root: `error`, `files`, `labels`, `types` |
+//! | `pictures` | image files with their colour profiles and orientation, maps of numbers, scaling, and images encoded for a request |
+//! | `light` | a clean image × a degradation → a degraded one, given a noise key; `light/python` is the Python module `darkqa_light` |
+//! | `data` | a folder, a ready-made set or the built-in rooms (`data/rooms`, drawn by a seed) → images, their maps and questions; `data/import`: other data sets, recordings of robots and videos → frames |
+//! | `questions` | a frame with its maps → questions with one true answer, by rule; the observer: what the rules could still answer from given pixels |
+//! | `enhance` | a degraded image → an enhanced one, by the user's ONNX model; `models` has the networks that the program carries |
+//! | `ask` | a prompt and images → a reply; `ask/wire`: the APIs of endpoints, their requests and replies |
+//! | `score` | `score/choice`: a reply → a choice, a mark or a text; `score/statistics`: estimates, tests and thresholds of clustered replies; records → numbers with their intervals |
+//! | `runs` | what is on disk: `runs/store`, the append-only folder of a run; shards and their merge; records as a table; `runs/python` reads it |
+//! | `report` | records → `report/sentences`, `report/tables`, `report/charts`, the page and its files; `report/joined`: of one run or several |
+//! | `engine` | a `Job` carries out an `Experiment`: it plans, has images made (`engine/images`, kept in `engine/image_cache`), asks, keeps, and has the experiment score |
+//! | `commands` | one file or folder a command; `commands/evaluate` and `commands/openeqa` are the two experiments. `commands/cli`: a flag is a field of a structure in the room that uses it, in that room's own types; the environment and a file of flags are turned into words, and all words are parsed once |
 //!
 //! A [`Frame`] is seen, a [`Question`] is asked, a [`Degradation`] is what was done to a frame, a [`Condition`] is a
 //! degradation with or without an enhancer, a [`Reply`] is what a model sent, and a `Record` is the result
-//! of one trial: one question to one model in one condition. The modules of this crate:
-//!
-//! - `dataset`: a folder, a ready-made set or the built-in rooms → images, their maps and questions.
-//! - `import`: other data sets → frames, one file a kind; `import/recording`, `import/lerobot`: recordings of robots and videos → frames.
-//! - `calibrate`: frames of a sensor → the camera that the synthesis takes its noise from.
-//! - `ask`: a prompt and images → a reply; the only asynchronous stage. `ask/wire`: the APIs of endpoints, their requests and replies.
-//! - `image_store`: a folder of images that were made, shared by runs and processes; it may be deleted at any time.
-//! - `text`: words, and the table model with its formats for the terminal, CSV and LaTeX.
-//! - `sentences`: the findings of a report; `tables`: its tables; `drawing`: its figures, and figures of images that are handed in.
-//! - `report`: the page, the files and the text of a report, from the records alone, and a leaderboard of many.
-//! - `images`: from a frame to the images of a request, made once by one pipeline for everything that is asked or written.
-//! - `runs`: runs on disk, read from their folders, joined from parts, and tabled.
-//! - `run_reports`: reports on one run or several, from their records alone.
-//! - `engine`: a `Job` carries out an `Experiment`: it plans, has images made, asks, keeps, and has the experiment score. Questions
-//!   with choices and open ones differ in their `Experiment` alone.
-//! - `run`: the commands; `run/evaluate` and `run/openeqa` are the two experiments.
-//! - `cli`: the commands. A flag is a field of a structure in the room that uses it, in that room's own types; the environment and
-//!   a file of flags are turned into words, and all words are parsed once.
-//! - `internals`: what benchmarks and tests of this repository use besides.
+//! of one trial: one question to one model in one condition. `internals` is what benchmarks and tests of this repository use besides.
 //!
 //! # Where to add what
 //!
@@ -140,56 +123,43 @@
 //!
 //! # Who may import whom
 //!
-//! `tests/program/architecture/` reads this table and fails on a breach. A room may use crates of the workspace and rooms whose rows are above its own. No file of
-//! `run` uses another command's, and files import each other in no circles but those that `tests/program/architecture/mod.rs` lists with
-//! a reason.
+//! `tests/program/architecture/` reads this table and fails on a breach. No file of `commands` but the command line uses another
+//! command's, and files import each other in no circles but those that `tests/program/architecture/mod.rs` lists with a reason.
 //!
-//! | module | may use |
+//! | room | may use |
 //! |---|---|
-//! | `dataset` | `rooms`, `labels`, `files`, `picture`, `types`, `error` |
-//! | `import` | `dataset`, `labels`, `files`, `picture`, `types`, `error` |
-//! | `ask` | `files`, `picture`, `types`, `error` |
-//! | `calibrate` | `dataset`, `light`, `files`, `picture`, `types`, `error` |
-//! | `image_store` | `files`, `types`, `error` |
-//! | `text` | `types`, `error`, `score` |
-//! | `sentences` | `text`, `types`, `error`, `score` |
-//! | `tables` | `sentences`, `text`, `types`, `error`, `score` |
-//! | `drawing` | `tables`, `sentences`, `text`, `types`, `error`, `score` |
-//! | `report` | `drawing`, `tables`, `sentences`, `text`, `types`, `error`, `score`, `questions`, `calibrate` |
-//! | `images` | `text`, `sentences`, `tables`, `drawing`, `report`, `files`, `picture`, `types`, `error`, `rooms`, `labels`, `dataset`, `questions`, `light`, `enhance`, `ask`, `score`, `store`, `image_store` |
-//! | `runs` | `images`, `ask`, `light`, `files`, `picture`, `types`, `error`, `dataset`, `enhance`, `score`, `store`, `image_store`, `text`, `sentences`, `tables`, `drawing`, `report` |
-//! | `run_reports` | `runs`, `images`, `ask`, `files`, `types`, `error`, `questions`, `score`, `store`, `text`, `sentences`, `tables`, `drawing`, `report` |
-//! | `engine` | `run_reports`, `runs`, `images`, `files`, `picture`, `types`, `error`, `rooms`, `labels`, `dataset`, `questions`, `light`, `enhance`, `ask`, `score`, `store`, `image_store`, `text`, `sentences`, `tables`, `drawing`, `report` |
-//! | `run` | `engine`, `run_reports`, `runs`, `images`, `files`, `picture`, `types`, `error`, `rooms`, `labels`, `import`, `dataset`, `calibrate`, `questions`, `light`, `enhance`, `ask`, `score`, `store`, `image_store`, `text`, `sentences`, `tables`, `drawing`, `report` |
-//! | `internals` | `ask`, `dataset`, `report` |
-//! | `cli` | `run`, `engine`, `run_reports`, `runs`, `images`, `picture`, `image_store`, `files`, `rooms`, `dataset`, `ask`, `enhance`, `score`, `light`, `types`, `error` |
-//! | `main` | `cli`, `enhance` |
+//! | `base` | nothing |
+//! | `pictures` | `base` |
+//! | `light` | `base` |
+//! | `data` | `base`, `pictures` |
+//! | `questions` | `base` |
+//! | `enhance` | `base`, `light` |
+//! | `ask` | `base`, `pictures` |
+//! | `score` | `base` |
+//! | `runs` | `base`, `data`, `enhance`, `ask`, `score` |
+//! | `report` | `base`, `questions`, `ask`, `score`, `runs` |
+//! | `engine` | `base`, `pictures`, `light`, `data`, `questions`, `enhance`, `ask`, `score`, `runs`, `report` |
+//! | `commands` | `base`, `pictures`, `light`, `data`, `questions`, `enhance`, `ask`, `score`, `runs`, `report`, `engine` |
+//! | `internals` | `data`, `ask`, `report` |
+//! | `main` | `enhance`, `commands` |
 
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test may panic"))]
 
 mod ask;
-mod calibrate;
-#[doc(hidden)]
-pub mod cli;
-mod dataset;
-mod drawing;
+mod commands;
+mod data;
 mod engine;
-mod image_store;
-mod images;
-mod import;
 #[doc(hidden)]
 pub mod internals;
 mod report;
-mod run;
-mod run_reports;
 mod runs;
-mod sentences;
-mod tables;
-mod text;
 
-pub(crate) use darkqa_ground::{error, files, labels, types};
-pub(crate) use darkqa_picture as picture;
-pub(crate) use darkqa_scenes as rooms;
+#[doc(hidden)]
+pub use commands::cli;
+
+pub(crate) use darkqa_base::{error, files, labels, types};
+pub(crate) use darkqa_pictures as pictures;
+pub(crate) use darkqa_rooms as rooms;
 pub(crate) use darkqa_store as store;
 
 pub use error::{Error, Result};

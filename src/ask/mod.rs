@@ -1,7 +1,7 @@
 //! Stage 4, ask: sends a prompt and an image to a model and receives a [`Reply`](crate::types::Reply). The only asynchronous
 //! stage.
 //!
-//! Before this stage, [`Prompts`] turn a question into text and [`Payload`](crate::picture::Payload) encodes an image as a data URL; both
+//! Before this stage, [`Prompts`] turn a question into text and [`Payload`](crate::pictures::Payload) encodes an image as a data URL; both
 //! are CPU work. A [`Model`] receives them as the [`Message`] of a [`Call`]. [`Remote`] is a model at an [`Endpoint`]. An endpoint is one
 //! server with one or several replicas, each with its own address, key, connections and rate limiter; all models at the server share it.
 //! The table `vendors.toml` has the properties of vendors. A [`Wire`](wire_kind::Wire) is an API; `wire/` has the form of its requests

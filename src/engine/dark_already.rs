@@ -2,11 +2,11 @@
 
 use rayon::prelude::*;
 
-use crate::dataset::Picture;
+use crate::data::Picture;
 use crate::engine::experiment::Experiment;
+use crate::engine::images::frames::{Frames, Source, SourceFrame};
+use crate::engine::images::progress::Progress;
 use crate::engine::settings::JobSettings;
-use crate::images::frames::{Frames, Source, SourceFrame};
-use crate::images::progress::Progress;
 use crate::types::{AxisLevel, SetLight};
 use darkqa_enhance::{EnhancerArgs, brightness as brightness_in_codes};
 use darkqa_light::{LightSettings, mean_luminance};

@@ -2,14 +2,14 @@
 
 use serde_json::Value;
 
+use crate::engine::images::frames::{Frames, Source};
+use crate::engine::images::recipes::Recipe;
+use crate::engine::images::trials::{Item, SourcePlan};
 use crate::engine::models::ModelUnderTest;
 use crate::engine::settings::JobSettings;
 use crate::error::Result;
-use crate::images::frames::{Frames, Source};
-use crate::images::recipes::Recipe;
-use crate::images::trials::{Item, SourcePlan};
-use crate::report::power::PowerForecast;
 use crate::runs::outcome::{Outcome, StdoutFormat};
+use crate::runs::power_forecast::PowerForecast;
 use crate::runs::stored::StoredRun;
 use crate::store::Store;
 use crate::types::manifests::{Columns, Identity, PartPlace};

@@ -6,10 +6,10 @@ use jiff::Timestamp;
 use serde_json::json;
 
 use crate::engine::experiment::{DetailOf, Experiment};
+use crate::engine::images::trials::Plan;
 use crate::engine::models::{AskSettings, ModelName};
 use crate::engine::settings::{JobSettings, RESULTS, RunPlace};
 use crate::error::{Error, Result};
-use crate::images::trials::Plan;
 use crate::store::{self, AddressChange};
 use crate::types::{Digest, StoredDetail as _};
 

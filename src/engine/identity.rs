@@ -6,10 +6,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde_json::{Value, json};
 
 use crate::ask::{Prices, by_flag};
+use crate::engine::images::recipes::Recipe;
 use crate::engine::models::ModelUnderTest;
 use crate::engine::settings::JobSettings;
-use crate::images::recipes::Recipe;
-use crate::picture::Scaling;
+use crate::pictures::Scaling;
 use crate::types::degradations::Kind;
 use crate::types::manifests::Columns;
 use crate::types::{Degradation, Digest, PairDark, ProfileName};

@@ -3,9 +3,9 @@
 use serde::Serialize;
 
 use crate::ask::ImagePlaces;
+use crate::engine::images::trials::Prompt;
 use crate::engine::models::ModelUnderTest;
 use crate::error::Result;
-use crate::images::trials::Prompt;
 use crate::types::{Condition, Digest, QuestionId, TrialKey};
 
 /// The inputs that affect a reply, from which the key of a trial is computed. Question and condition are included, because built-in

@@ -3,10 +3,10 @@
 use std::collections::VecDeque;
 use std::sync::{Arc, Weak};
 
+use crate::engine::images::trials::{Stimulus, Trial};
+use crate::engine::images::workers::ThreadArgs;
 use crate::engine::models::ModelUnderTest;
 use crate::engine::open_files::RequestLimit;
-use crate::images::trials::{Stimulus, Trial};
-use crate::images::workers::ThreadArgs;
 use crate::types::text::counted;
 
 /// Maximum bytes of images held so that idle endpoints can work ahead of the slowest; chosen: about fifty images of 1280×720 as PNG.

@@ -6,10 +6,10 @@ use serde_json::Value;
 
 use crate::engine::experiment::{DetailOf, Experiment};
 use crate::engine::identity;
+use crate::engine::images::frames::input_summary;
+use crate::engine::images::recipes::image_words::ImageWords;
 use crate::engine::settings::JobSettings;
 use crate::error::Result;
-use crate::images::frames::input_summary;
-use crate::images::recipes::image_words::ImageWords;
 use crate::runs::changed_settings::is_kept;
 use crate::runs::divisions::tasks_setting;
 use crate::runs::renamed::{self, SettingsChange};

@@ -20,8 +20,8 @@ use std::sync::Arc;
 use serde_json::{Value, json};
 
 use crate::ask::{Endpoint, Model, Parameters, Price, Prices, Remote, Script, Server, Unpriced};
+use crate::engine::images::trials::{Item, Stimulus, Trial};
 use crate::error::{Error, Result};
-use crate::images::trials::{Item, Stimulus, Trial};
 use crate::runs::changed_settings::{self, CHANGED_FOR, REFUSED_FOR};
 use crate::runs::renamed::ADAPTED_FOR;
 use crate::types::{Condition, Record, View};

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::ask::{Call, Local, LocalAnswer, Random};
-use crate::dataset::{DataPlace, Dataset};
+use crate::data::{DataPlace, Dataset};
 use crate::error::{Error, Result};
 use crate::types::replies::OBSERVER;
 use crate::types::values::Recent;

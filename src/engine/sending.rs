@@ -4,9 +4,9 @@ use tokio::sync::watch;
 
 use crate::ask::{AskError, Call, Reservation};
 use crate::engine::costs::Permit;
+use crate::engine::images::trials::Item;
 use crate::engine::lanes::PreparedTrial;
 use crate::engine::models::ModelUnderTest;
-use crate::images::trials::Item;
 use crate::types::{LostAttempts, Reply};
 
 /// One trial, with its reply or error.

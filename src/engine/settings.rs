@@ -14,16 +14,16 @@ use crate::ask::{
 };
 use crate::engine::continuation::Continuation;
 use crate::engine::costs::{MoneyArgs, MoneySettings};
+use crate::engine::image_cache::StoreArgs;
+use crate::engine::images::enhancement::enhancers::{self, EnhancerRunArgs};
+use crate::engine::images::recipes::image_words::ImageWords;
+use crate::engine::images::trials::check_used;
 use crate::engine::models::{
     AskSettings, AskingArgs, KeyUse, ModelArgs, ModelName, ResolveContext, TextBaseline,
 };
 use crate::error::{Error, Result};
 use crate::files::folder_access::FolderAccess;
-use crate::image_store::StoreArgs;
-use crate::images::enhancement::enhancers::{self, EnhancerRunArgs};
-use crate::images::recipes::image_words::ImageWords;
-use crate::images::trials::check_used;
-use crate::picture::{ImageArgs, PayloadFormat};
+use crate::pictures::{ImageArgs, PayloadFormat};
 use crate::runs::outcome::{RecordTable, ShowArgs, StdoutFormat};
 use crate::runs::resolved_shard::ResolvedShard;
 use crate::runs::run_plan::RunPlan;

@@ -1,9 +1,9 @@
 //! Content of a report on multiple-choice questions: [`ChoiceReport`].
 
-use crate::sentences::{Sentence, sentences};
-use crate::tables::{EnhancerRow, enhancers, observer_notes, tables, with_training};
-use crate::text::alert::{Alert, AlertKind};
-use crate::text::table::Table;
+use crate::report::sentences::{Sentence, sentences};
+use crate::report::tables::{EnhancerRow, enhancers, observer_notes, tables, with_training};
+use crate::report::text::alert::{Alert, AlertKind};
+use crate::report::text::table::Table;
 use darkqa_score::findings::Findings;
 
 /// Findings of one or more runs as sentences and tables, for the terminal, the page and the files of a report.

@@ -3,8 +3,8 @@
 
 use std::fmt::{self, Write as _};
 
-use crate::sentences::{Sentence, capitalised};
-use crate::text::words::{percent, points, share_ends};
+use crate::report::sentences::{Sentence, capitalised};
+use crate::report::text::words::{percent, points, share_ends};
 
 /// Title of a group, and the kinds of sentences that belong to it.
 struct GroupKinds {

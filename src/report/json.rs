@@ -7,13 +7,13 @@ use serde::{Serialize, Serializer};
 
 use crate::error::{Error, Result};
 use crate::report::choice_report::ChoiceReport;
-use crate::report::report_length::ReportLength;
-use crate::sentences::Sentence;
-use crate::tables::{BASELINE, strict_groups, summary_rows};
-use crate::text::alert::Alert;
-use crate::text::csv::fields;
-use crate::text::noise_profiles::NoiseProfiles;
-use crate::text::table::{Table, TableRow};
+use crate::report::sentences::Sentence;
+use crate::report::tables::{BASELINE, strict_groups, summary_rows};
+use crate::report::text::alert::Alert;
+use crate::report::text::csv::fields;
+use crate::report::text::noise_profiles::NoiseProfiles;
+use crate::report::text::table::{Table, TableRow};
+use crate::runs::report_length::ReportLength;
 use crate::types::UnreadReason;
 use crate::types::manifests::RunManifest;
 
@@ -190,8 +190,8 @@ pub(crate) fn summary(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::text::table::ColumnKind::Count;
-    use crate::text::table::TableBuilder;
+    use crate::report::text::table::ColumnKind::Count;
+    use crate::report::text::table::TableBuilder;
 
     #[test]
     fn tables_without_csv_columns_have_no_rows() {

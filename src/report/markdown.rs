@@ -6,14 +6,14 @@ use std::fmt::Write;
 use crate::report::choice_report::ChoiceReport;
 use crate::report::finding_groups::FindingGroups;
 use crate::report::openeqa::{OpenReport, coverage};
-use crate::report::report_length::ReportLength;
 use crate::report::self_agreement::{self, AgreementReport};
+use crate::report::sentences::how_to_read;
 use crate::report::short::head;
-use crate::sentences::how_to_read;
-use crate::text::alert::Alert;
-use crate::text::readable::readable;
-use crate::text::table::{Column, ColumnKind, Table, TableFormat};
-use crate::text::words::{ends, interval, words};
+use crate::report::text::alert::Alert;
+use crate::report::text::readable::readable;
+use crate::report::text::table::{Column, ColumnKind, Table, TableFormat};
+use crate::report::text::words::{ends, interval, words};
+use crate::runs::report_length::ReportLength;
 use crate::types::text::counted;
 
 /// Name of the table of accuracies or scores by level.
@@ -254,8 +254,8 @@ fn block(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::text::table::ColumnKind::{Accuracy, Text};
-    use crate::text::table::TableBuilder;
+    use crate::report::text::table::ColumnKind::{Accuracy, Text};
+    use crate::report::text::table::TableBuilder;
     use darkqa_score::estimate::Estimate;
 
     #[test]

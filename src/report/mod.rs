@@ -1,22 +1,24 @@
 //! Reports, made from stored records: text for the terminal, HTML pages and files.
 
-pub(crate) mod calibration;
+pub(crate) mod charts;
 pub(crate) mod choice_report;
 pub(crate) mod doctor;
 mod finding_groups;
 pub(crate) mod forecast;
+pub(crate) mod joined;
 pub(crate) mod json;
 pub(crate) mod markdown;
 pub(crate) mod openeqa;
 pub(crate) mod page;
-pub(crate) mod power;
 pub(crate) mod products;
 pub(crate) mod questions;
 pub(crate) mod realism;
-pub(crate) mod report_length;
 mod script_policy;
 pub(crate) mod self_agreement;
+pub(crate) mod sentences;
 pub(crate) mod short;
 pub(crate) mod site;
 pub(crate) mod study;
+pub(crate) mod tables;
 mod template;
+pub(crate) mod text;

@@ -1,18 +1,18 @@
 //! Files of a report: [`products`].
 
-use crate::drawing::chart;
-use crate::drawing::chart::Figure;
-use crate::drawing::figures::{Names, figure_specs};
-use crate::drawing::paper::figure;
-use crate::drawing::samples::{self, samples};
-use crate::drawing::views;
 use crate::error::Result;
+use crate::report::charts::chart;
+use crate::report::charts::chart::Figure;
+use crate::report::charts::figures::{Names, figure_specs};
+use crate::report::charts::paper::figure;
+use crate::report::charts::samples::{self, samples};
+use crate::report::charts::views;
 use crate::report::choice_report::ChoiceReport;
 use crate::report::page::{PageInputs, page};
-use crate::sentences::Sentence;
-use crate::text::csv;
-use crate::text::latex;
-use crate::text::table::Table;
+use crate::report::sentences::Sentence;
+use crate::report::text::csv;
+use crate::report::text::latex;
+use crate::report::text::table::Table;
 
 /// Files of a report by name: numbers as CSV, the main tables as LaTeX, figures as SVG, and the HTML page.
 ///

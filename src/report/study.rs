@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::script_policy::allow_script;
 use crate::error::Result;
-use crate::text::script::to_script_json;
+use crate::report::text::script::to_script_json;
 use crate::types::Digest;
 
 /// Template of the page.

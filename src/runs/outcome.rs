@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::report::report_length::ReportLength;
+use crate::runs::report_length::ReportLength;
 use crate::types::Decides;
 use crate::types::manifests::Status;
 

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use crate::report::forecast::money;
 use crate::types::manifests::RunManifest;
+use crate::types::text::money;
 
 /// Manifest setting with the note.
 const ENTRY: &str = "--max-cost exceeded";

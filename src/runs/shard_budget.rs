@@ -2,8 +2,8 @@
 
 use serde_json::json;
 
-use crate::report::forecast::money;
 use crate::types::manifests::RunManifest;
+use crate::types::text::money;
 
 /// Manifest setting with the share of a shard, the amount spent, and the amount left, in US dollars.
 const ENTRY: &str = "--max-cost of this part";

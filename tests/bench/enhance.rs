@@ -8,8 +8,8 @@ use std::hint::black_box;
 use std::path::PathBuf;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use darkqa_base::types::Rgb;
 use darkqa_enhance::{Enhancer, Install, ModelFile, RuntimeSearch, Tiling, disable_telemetry};
-use darkqa_ground::types::Rgb;
 
 /// A dark frame with texture, made by integer arithmetic.
 #[expect(clippy::unwrap_used, reason = "the size fits the samples")]

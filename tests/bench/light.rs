@@ -6,7 +6,7 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use darkqa_ground::types::{FrameId, Rgb, Severity};
+use darkqa_base::types::{FrameId, Rgb, Severity};
 use darkqa_light::exposure::expose;
 use darkqa_light::exposure::expose_into;
 use darkqa_light::movement::blur::{blur, blurred_codes};
@@ -17,9 +17,9 @@ use darkqa_light::{
     Amplify, AppliedDegradation, AutoExposure, CameraModel, Draws, Exposures, FrameView, Motion,
     NoiseKey, NoiseProfile, Streak, Synthesis,
 };
-use darkqa_picture::Payload;
-use darkqa_picture::PayloadFormat;
-use darkqa_picture::bilinear;
+use darkqa_pictures::Payload;
+use darkqa_pictures::PayloadFormat;
+use darkqa_pictures::bilinear;
 use darkqa_score::photographs::realism::psnr;
 use darkqa_score::photographs::realism::ssim::ssim;
 

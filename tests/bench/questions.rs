@@ -7,10 +7,10 @@ use std::path::Path;
 use std::sync::Arc;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use darkqa_eval::internals::dataset::Dataset;
-use darkqa_ground::types::{
+use darkqa_base::types::{
     DepthKind, Digest, Frame, FrameId, Intrinsics, Label, Labels, Rgb, Segmentation,
 };
+use darkqa_eval::internals::dataset::Dataset;
 use darkqa_questions::colors::Palette;
 use darkqa_questions::rules::Rules;
 use darkqa_questions::statistics::measure;

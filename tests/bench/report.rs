@@ -15,11 +15,11 @@ use std::collections::HashMap;
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use darkqa_eval::Kind;
-use darkqa_eval::internals::report::{ChoiceReport, PageInputs, products};
-use darkqa_ground::types::{
+use darkqa_base::types::{
     ChoiceDetail, Condition, Degradation, Digest, Family, Record, Severity, Trials,
 };
+use darkqa_eval::Kind;
+use darkqa_eval::internals::report::{ChoiceReport, PageInputs, products};
 use darkqa_score::cluster::FrameTies;
 use darkqa_score::findings::Findings;
 use made::record;

@@ -11,9 +11,9 @@ use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use darkqa_questions::colors::Palette;
 use darkqa_questions::observer::ObservedFrame;
 use darkqa_questions::rules::Rules;
-use darkqa_scenes::Room;
-use darkqa_scenes::Rooms;
-use darkqa_scenes::labels;
+use darkqa_rooms::Room;
+use darkqa_rooms::Rooms;
+use darkqa_rooms::labels;
 
 const SIZES: [[usize; 2]; 2] = [[640, 480], [1280, 720]];
 

@@ -12,7 +12,7 @@ import numpy as np
 from PIL import Image
 
 TOP = Path(__file__).resolve().parents[2]
-EXAMPLES = TOP / "src" / "python_light" / "examples"
+EXAMPLES = TOP / "src" / "light" / "python" / "examples"
 PAGE = TOP / "src" / "docs" / "training.md"
 
 

@@ -1,6 +1,6 @@
 //! Records whose truth is known, as a run would have kept them.
 
-use darkqa_ground::types::{
+use darkqa_base::types::{
     ChoiceDetail, Condition, Digest, Family, FrameId, ParsedAnswer, QuestionId, Record,
     TrialOutcome,
 };

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use serde::Serialize;
 
 use crate::ask::failures::{AskError, Reach};
-use crate::picture::Payload;
+use crate::pictures::Payload;
 use crate::types::text::image_mark::{MarkedPiece, pieces};
 use crate::types::{Condition, FailureKind, Question, QuestionId};
 
@@ -159,7 +159,7 @@ pub struct Call<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::picture::PayloadFormat;
+    use crate::pictures::PayloadFormat;
     use crate::types::Rgb;
 
     /// Parts of a message with images of 1, 2, … pixels width: texts, and the widths of images.

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::ask::requests::RequestBody;
-use crate::picture::Payload;
+use crate::pictures::Payload;
 
 /// Builds a request body from the JSON object `fields` and one more field with the value `json`, in which each `place` is replaced by
 /// the data URL of an image. The bytes of the images are shared, not copied.

@@ -8,15 +8,15 @@ use super::journal::Journal;
 use super::requests::{CostOf, Requests, require_remote, summary};
 use crate::engine::dark_already;
 use crate::engine::experiment::Experiment;
+use crate::engine::images::recipes::Maker;
+use crate::engine::images::stored::StoredImages;
+use crate::engine::images::timings::Timings;
+use crate::engine::images::trials::{Item, Plan};
+use crate::engine::images::workers::pool;
 use crate::engine::open_run::{
     OpenRun, Remaining, every_model, image_limit, missing_notes, pipeline,
 };
 use crate::error::{Error, Result};
-use crate::images::recipes::Maker;
-use crate::images::stored::StoredImages;
-use crate::images::timings::Timings;
-use crate::images::trials::{Item, Plan};
-use crate::images::workers::pool;
 use crate::runs::outcome::Outcome;
 use crate::types::manifests::Status;
 

@@ -9,9 +9,9 @@ use super::file::{Destination, FileLimits, ModelInputFiles, Register, RequestCos
 use super::part_name::file_name;
 use super::servers::account;
 use crate::ask::BatchInterface;
+use crate::engine::images::trials::{Item, PreparedGroup, Stimulus, Trial};
 use crate::engine::models::ModelUnderTest;
 use crate::error::{Error, Result};
-use crate::images::trials::{Item, PreparedGroup, Stimulus, Trial};
 use crate::store::BATCH;
 use crate::types::text::counted;
 

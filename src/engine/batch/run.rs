@@ -17,17 +17,17 @@ use super::summary;
 use crate::engine::circuit_breaker::EndReason;
 use crate::engine::costs::{Budget, BudgetNotes, RunModels};
 use crate::engine::experiment::Experiment;
+use crate::engine::images::enhancement::enhancers::{self, EnhancerModels};
+use crate::engine::images::trials::{Item as _, Stimulus, Trial};
 use crate::engine::interrupt::Interrupt;
 use crate::engine::models::{self, ModelUnderTest};
 use crate::engine::open_run::{OpenRun, Remaining, answered, every_model};
 use crate::error::{Error, Result};
-use crate::images::enhancement::enhancers::{self, EnhancerModels};
-use crate::images::trials::{Item as _, Stimulus, Trial};
-use crate::report::forecast::money;
 use crate::runs::outcome::Outcome;
 use crate::store::StoredTrial;
 use crate::types::TrialKey;
 use crate::types::manifests::Status;
+use crate::types::text::money;
 use crate::types::text::plural;
 
 /// Maximum number of further batches for requests without a reply; chosen.

@@ -5,8 +5,8 @@ use super::event::Event;
 use crate::ask::batch_api::{BatchState, NewBatch, Readiness, RemoteBatch};
 use crate::ask::{AskError, BatchInterface};
 use crate::error::{Error, Result};
-use crate::report::forecast::money;
 use crate::types::text::counted;
+use crate::types::text::money;
 use darkqa_score::answers::record::Detail;
 
 /// Number of consecutive failed uploads or creations after which a model is stopped; chosen: 15 minutes by [`hold`](Driver::hold) with the

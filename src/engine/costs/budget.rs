@@ -10,12 +10,12 @@ use crate::ask::{
 use crate::engine::costs::money::MoneySettings;
 use crate::engine::costs::prompt_bounds::{self, PromptBounds, PromptFacts};
 use crate::engine::costs::stored_costs::StoredCosts;
+use crate::engine::images::frames::Source;
+use crate::engine::images::trials::{Item, Prompt, Trial};
 use crate::engine::models::ModelUnderTest;
 use crate::error::{Error, Result};
-use crate::images::frames::Source;
-use crate::images::trials::{Item, Prompt, Trial};
-use crate::picture::Scaling;
-use crate::run_reports;
+use crate::pictures::Scaling;
+use crate::report::joined;
 use crate::store::StoredTrial;
 use crate::types::manifests::RunManifest;
 use crate::types::{ImageFacts, Usage};
@@ -43,7 +43,7 @@ impl RunModels<'_> {
         let model = self.models.iter().find(|model| *model.name == *name);
         match (model, self.manifest) {
             (Some(model), _) => model.price(&money.prices),
-            (None, Some(manifest)) => run_reports::price(&money.prices, manifest, name),
+            (None, Some(manifest)) => joined::price(&money.prices, manifest, name),
             (None, None) => money.prices.find(name),
         }
     }

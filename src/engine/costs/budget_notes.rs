@@ -4,7 +4,7 @@ use crate::ask::Spending;
 use crate::engine::costs::budget::Budget;
 use crate::engine::costs::money::MoneySettings;
 use crate::engine::models::ModelUnderTest;
-use crate::report::forecast::money;
+use crate::types::text::money;
 
 /// Warnings about `--max-cost`, at most one for each model.
 #[derive(Debug)]

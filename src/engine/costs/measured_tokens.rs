@@ -6,8 +6,8 @@
 use std::collections::HashMap;
 
 use crate::engine::costs::budget::text_tokens;
-use crate::images::frames::Source;
-use crate::images::trials::{Item, Plan};
+use crate::engine::images::frames::Source;
+use crate::engine::images::trials::{Item, Plan};
 use crate::store::StoredTrial;
 use crate::types::TrialKey;
 

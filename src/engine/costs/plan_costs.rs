@@ -3,8 +3,8 @@
 use crate::ask::Price;
 use crate::engine::costs::budget::{shown_tokens, text_tokens};
 use crate::engine::experiment::Experiment;
-use crate::images::frames::Source;
-use crate::images::trials::{Item as _, SourcePlan, TrialGroup};
+use crate::engine::images::frames::Source;
+use crate::engine::images::trials::{Item as _, SourcePlan, TrialGroup};
 use crate::runs::run_plan::FrameCost;
 
 /// Processor seconds for each million pixels of an image that is degraded and encoded; measured on 1280 × 720, rounded.

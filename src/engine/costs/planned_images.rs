@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use crate::engine::experiment::Experiment;
+use crate::engine::image_cache::ImageSet;
+use crate::engine::images::frame_work::FrameWork;
+use crate::engine::images::frames::Source;
+use crate::engine::images::image_pipeline::ImagePipeline;
+use crate::engine::images::stored::Needed;
+use crate::engine::images::trials::Plan;
 use crate::error::Result;
-use crate::image_store::ImageSet;
-use crate::images::frame_work::FrameWork;
-use crate::images::frames::Source;
-use crate::images::image_pipeline::ImagePipeline;
-use crate::images::stored::Needed;
-use crate::images::trials::Plan;
 use crate::types::{Condition, ImageFacts};
 
 /// Number of sources whose images are made to measure their size. Images with enhancers are made for the first of them only.

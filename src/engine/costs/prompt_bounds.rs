@@ -6,7 +6,7 @@
 
 use std::collections::VecDeque;
 
-use crate::images::trials::Prompt;
+use crate::engine::images::trials::Prompt;
 use crate::types::ImageFacts;
 
 /// Tokens that a chat template adds to a message; chosen: more than those of known models.

@@ -3,8 +3,8 @@
 use crate::ask::ImageTokenCheck;
 use crate::engine::costs::budget::{Budget, text_tokens};
 use crate::engine::costs::measured_tokens::MeasuredTokens;
+use crate::engine::images::trials::{Item, Trial};
 use crate::engine::models::ModelUnderTest;
-use crate::images::trials::{Item, Trial};
 use crate::types::{ImageFacts, Usage};
 
 /// Charged tokens of the prompts of a run, for each of its models. Warns once for each if they differ from the estimate, and if they show

@@ -5,10 +5,10 @@ use std::sync::Arc;
 use super::describe::open_model;
 use super::settings::AskSettings;
 use crate::ask::{Call, ImagePlaces, Message, Query};
+use crate::engine::images::progress::Progress;
+use crate::engine::images::workers::thread_start_error;
 use crate::error::Result;
-use crate::images::progress::Progress;
-use crate::images::workers::thread_start_error;
-use crate::picture::{Payload, PayloadFormat};
+use crate::pictures::{Payload, PayloadFormat};
 use crate::types::{Condition, QuestionId, Rgb, View};
 
 /// A question for a model without images.

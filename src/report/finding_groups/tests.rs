@@ -1,5 +1,5 @@
 use super::*;
-use crate::sentences::{Scope, Tone};
+use crate::report::sentences::{Scope, Tone};
 
 fn sentence(kind: &'static str, tone: Tone, text: &str, scope: Scope) -> Sentence {
     Sentence {

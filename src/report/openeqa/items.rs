@@ -8,7 +8,7 @@ use crate::report::page::data::{
     ABSENT, Distinct, FAILED, Item, ModelInCondition, PageData, PageKind, Question, SizeLimit,
     UNREAD, levels, packed_by, shortened, sizes, thumbnails,
 };
-use crate::text::words;
+use crate::report::text::words;
 use crate::types::AxisLevel;
 use darkqa_score::model_in_condition;
 use darkqa_score::open::{AnswerOutcome, Group};

@@ -18,16 +18,16 @@ pub(crate) use open_report::{OpenReport, ReportedAnswer};
 pub(crate) use tables::tables;
 
 pub(super) use self::coverage::coverage;
-use crate::drawing::chart;
 use crate::error::Result;
+use crate::report::charts::chart;
 use crate::report::json;
 use crate::report::products::{PAGE, table_files};
-use crate::report::report_length::ReportLength;
-use crate::text::alert::{Alert, lines};
-use crate::text::noise_profiles::NoiseProfiles;
-use crate::text::table::Table;
-use crate::text::terminal;
-use crate::text::wrapped::wrapped;
+use crate::report::text::alert::{Alert, lines};
+use crate::report::text::noise_profiles::NoiseProfiles;
+use crate::report::text::table::Table;
+use crate::report::text::terminal;
+use crate::report::text::wrapped::wrapped;
+use crate::runs::report_length::ReportLength;
 use crate::types::manifests::RunManifest;
 
 /// Files of a run by name: numbers as CSV, the table as LaTeX, figures as SVG, answers and marks in upstream's format, and the

@@ -1,8 +1,8 @@
 //! Data of a report on open questions: [`OpenReport`].
 
-use crate::tables::EnhancerRow;
-use crate::text::alert::Alert;
-use crate::text::noise_profiles::NoiseProfiles;
+use crate::report::tables::EnhancerRow;
+use crate::report::text::alert::Alert;
+use crate::report::text::noise_profiles::NoiseProfiles;
 use crate::types::manifests::RunManifest;
 use crate::types::{RunQuestion, Thumbnail};
 use darkqa_score::choice::llm_match::Protocol;

@@ -1,14 +1,14 @@
 //! Tables of a run of open questions: [`tables`].
 
 use super::open_report::OpenReport;
-use crate::tables::{enhancers, reading, with_training};
-use crate::text::ladder::{Ladder, Series, SeriesByLevel};
-use crate::text::latex::escape;
-use crate::text::table::ColumnKind::{Accuracy, Count, Points, Share, Text};
-use crate::text::table::SUMMARY;
-use crate::text::table::{ColumnKind, Table, TableBuilder, TableCell};
-use crate::text::terminal::texts;
-use crate::text::words::ends;
+use crate::report::tables::{enhancers, reading, with_training};
+use crate::report::text::ladder::{Ladder, Series, SeriesByLevel};
+use crate::report::text::latex::escape;
+use crate::report::text::table::ColumnKind::{Accuracy, Count, Points, Share, Text};
+use crate::report::text::table::SUMMARY;
+use crate::report::text::table::{ColumnKind, Table, TableBuilder, TableCell};
+use crate::report::text::terminal::texts;
+use crate::report::text::words::ends;
 use crate::types::degradations::Axis;
 use crate::types::text::counted;
 use darkqa_score::estimate::Estimate;

@@ -11,7 +11,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use crate::error::{Error, Result};
-use crate::text::words;
+use crate::report::text::words;
 use crate::types::questions::PixelBox;
 use crate::types::{Axis, AxisLevel, EnhancerName, FrameId, ObjectCrop, Thumbnail, View};
 use darkqa_score::model_in_condition;

@@ -4,14 +4,14 @@ use serde::Serialize;
 
 use super::inputs::PageInputs;
 use super::strip::Strip;
-use crate::drawing::chart::figure_chart::FigureChart;
-use crate::drawing::chart::{Chart, Figure};
-use crate::drawing::figures::{Names, overview, split};
-use crate::drawing::paper::figure;
 use crate::error::Result;
+use crate::report::charts::chart::figure_chart::FigureChart;
+use crate::report::charts::chart::{Chart, Figure};
+use crate::report::charts::figures::{Names, overview, split};
+use crate::report::charts::paper::figure;
 use crate::report::choice_report::ChoiceReport;
 use crate::report::finding_groups::{Effect, Finding, FindingGroups};
-use crate::sentences::capitalised;
+use crate::report::sentences::capitalised;
 
 /// Half the width of the drawing of intervals, in its own units. The largest end of all intervals is drawn there.
 const MARK_REACH: f64 = 50.0;
@@ -164,7 +164,7 @@ fn chart(report: &ChoiceReport<'_>) -> Result<Option<Figure>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sentences::{Scope, Sentence, Tone};
+    use crate::report::sentences::{Scope, Sentence, Tone};
 
     #[test]
     fn a_percent_sign_stays_with_its_number() {

@@ -9,8 +9,8 @@ use super::data::{
 use super::inputs::PageInputs;
 use super::sample::sample;
 use crate::error::Result;
-use crate::text::outcome_words;
-use crate::text::words::family;
+use crate::report::text::outcome_words;
+use crate::report::text::words::family;
 use crate::types::{AxisLevel, FailureKind, QuestionId, RunQuestion, TrialRef, UnreadReason};
 use darkqa_score::answers::confusion;
 use darkqa_score::choice::ParsingMode;

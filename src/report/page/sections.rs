@@ -3,10 +3,10 @@
 use serde::Serialize;
 
 use super::tables;
-use crate::drawing::chart::Figure;
-use crate::drawing::samples::{SampleTable, samples};
-use crate::tables::{ENHANCERS, Section};
-use crate::text::table::Table;
+use crate::report::charts::chart::Figure;
+use crate::report::charts::samples::{SampleTable, samples};
+use crate::report::tables::{ENHANCERS, Section};
+use crate::report::text::table::Table;
 use crate::types::Thumbnail;
 
 /// Section for the template.

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::inputs::PageInputs;
 use crate::error::Result;
-use crate::text::words::light;
+use crate::report::text::words::light;
 use crate::types::{Axis, AxisLevel, EnhancerName, FrameId, Thumbnail, Variant};
 use darkqa_score::choice::ParsingMode;
 use darkqa_score::grid::{Grid, TrialResult};

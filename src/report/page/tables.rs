@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use crate::text::table::{ColumnKind, Table, TableCell, TableFormat, TableRow};
-use crate::text::words::{ends, interval, words};
+use crate::report::text::table::{ColumnKind, Table, TableCell, TableFormat, TableRow};
+use crate::report::text::words::{ends, interval, words};
 use darkqa_score::estimate::Estimate;
 use darkqa_score::significance::Significance;
 

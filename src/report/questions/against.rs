@@ -2,9 +2,9 @@
 
 use serde::Serialize;
 
-use crate::text::table::ColumnKind::Text;
-use crate::text::table::TableBuilder;
-use crate::text::terminal;
+use crate::report::text::table::ColumnKind::Text;
+use crate::report::text::table::TableBuilder;
+use crate::report::text::terminal;
 use darkqa_questions::appearance::{FrameAppearance, MIN_EDGE_GRADIENT};
 use darkqa_questions::colors::{Color, NONE};
 

@@ -4,10 +4,10 @@ use std::fmt::Write as _;
 
 use serde_json::{Value, json};
 
-use crate::text::table::ColumnKind::{Count, Text};
-use crate::text::table::TableBuilder;
-use crate::text::terminal;
-use crate::text::words::with_interval;
+use crate::report::text::table::ColumnKind::{Count, Text};
+use crate::report::text::table::TableBuilder;
+use crate::report::text::terminal;
+use crate::report::text::words::with_interval;
 use crate::types::Family;
 use darkqa_score::answers::checks::{Checks, agreements, shares};
 use darkqa_score::estimate::Estimate;

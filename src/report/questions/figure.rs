@@ -1,8 +1,8 @@
 //! Bar charts of a set of questions, as SVG: [`figure`].
 
-use crate::drawing::chart::counts::CountPanel;
-use crate::drawing::paper::count_figure;
 use crate::error::Result;
+use crate::report::charts::chart::counts::CountPanel;
+use crate::report::charts::paper::count_figure;
 use crate::types::Family;
 use darkqa_questions::summary::{ClassCoverage, QuestionSummary};
 

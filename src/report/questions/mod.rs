@@ -11,10 +11,10 @@ use against::AppearanceComparison;
 use serde::Serialize;
 
 use crate::error::{Error, Result};
-use crate::text::csv as files;
-use crate::text::table::ColumnKind::{Count, Text};
-use crate::text::table::TableBuilder;
-use crate::text::terminal;
+use crate::report::text::csv as files;
+use crate::report::text::table::ColumnKind::{Count, Text};
+use crate::report::text::table::TableBuilder;
+use crate::report::text::terminal;
 use crate::types::Family;
 use crate::types::text::counted;
 use darkqa_questions::summary::{Baselines, CandidateCounts, QuestionSummary};

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use crate::error::Result;
 use crate::report::script_policy::allow_script;
-use crate::text::script::to_script_json;
+use crate::report::text::script::to_script_json;
 use crate::types::Digest;
 use darkqa_questions::GeneratedQuestion;
 

@@ -1,13 +1,13 @@
 //! Files of a comparison of synthetic with real low light: CSV tables, the figure of residuals, and crops.
 
-use crate::drawing::chart::LineStyle;
-use crate::drawing::chart::points::{PointPanel, PointSeries};
-use crate::drawing::paper::point_figure;
-use crate::drawing::sheet::{self, CropRow};
 use crate::error::Result;
-use crate::text::csv::csv;
-use crate::text::table::ColumnKind::{Count, Number, Text};
-use crate::text::table::TableBuilder;
+use crate::report::charts::chart::LineStyle;
+use crate::report::charts::chart::points::{PointPanel, PointSeries};
+use crate::report::charts::paper::point_figure;
+use crate::report::charts::sheet::{self, CropRow};
+use crate::report::text::csv::csv;
+use crate::report::text::table::ColumnKind::{Count, Number, Text};
+use crate::report::text::table::TableBuilder;
 use crate::types::Rgb;
 use darkqa_score::photographs::realism::residual::Residuals;
 use darkqa_score::photographs::realism::{

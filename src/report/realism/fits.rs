@@ -1,10 +1,10 @@
 //! Table and file of the gains fitted to real images: [`table`], [`pair_lines`] and [`csv()`].
 
 use crate::error::Result;
-use crate::text::csv;
-use crate::text::table::ColumnKind::{Number, Text};
-use crate::text::table::TableBuilder;
-use crate::text::terminal;
+use crate::report::text::csv;
+use crate::report::text::table::ColumnKind::{Number, Text};
+use crate::report::text::table::TableBuilder;
+use crate::report::text::terminal;
 use darkqa_score::photographs::realism::gain::{FitOutcome, PairFit, PooledGain, ProfileFit};
 use darkqa_score::photographs::realism::mean::Mean;
 

@@ -11,9 +11,9 @@ pub(crate) use fits::{AS_SAVED, csv as fits_csv};
 use rows::{MethodRow, NoiseRow, difference_text, mean_text};
 
 use crate::error::{Error, Result};
-use crate::text::table::ColumnKind::{Count, Text};
-use crate::text::table::TableBuilder;
-use crate::text::terminal;
+use crate::report::text::table::ColumnKind::{Count, Text};
+use crate::report::text::table::TableBuilder;
+use crate::report::text::terminal;
 use crate::types::text::counted;
 use darkqa_score::photographs::realism::gain::ProfileFit;
 use darkqa_score::photographs::realism::mean::{MIN_VALUES, Mean};

@@ -1,10 +1,10 @@
 //! Content of a report on questions without true answers: [`AgreementReport`].
 
 use super::tables;
-use crate::sentences::{Sentence, self_agreement};
-use crate::tables::{EnhancerRow, enhancers, with_training};
-use crate::text::alert::Alert;
-use crate::text::table::Table;
+use crate::report::sentences::{Sentence, self_agreement};
+use crate::report::tables::{EnhancerRow, enhancers, with_training};
+use crate::report::text::alert::Alert;
+use crate::report::text::table::Table;
 use darkqa_score::comparisons::self_agreement::SelfAgreement;
 
 /// Results of one or more runs on questions without true answers, as sentences and as tables.

@@ -1,10 +1,10 @@
 //! Figures of a report on questions without true answers: [`figures`].
 
-use crate::drawing::chart::figure_chart::FigureChart;
-use crate::drawing::chart::{Chart, Figure, LineContent, LineStyle, Panel, PlotLine};
-use crate::drawing::paper::figure;
 use crate::error::Result;
-use crate::text::ladder::{Ladder, Series, SeriesByLevel};
+use crate::report::charts::chart::figure_chart::FigureChart;
+use crate::report::charts::chart::{Chart, Figure, LineContent, LineStyle, Panel, PlotLine};
+use crate::report::charts::paper::figure;
+use crate::report::text::ladder::{Ladder, Series, SeriesByLevel};
 use crate::types::AxisLevel;
 use crate::types::text::counted;
 use darkqa_score::comparisons::self_agreement::SelfAgreement;

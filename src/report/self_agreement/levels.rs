@@ -3,10 +3,10 @@
 use std::collections::BTreeSet;
 
 use super::measure::AGREEMENT;
-use crate::text::ladder::{Ladder, SeriesByLevel};
-use crate::text::table::ColumnKind::{Accuracy, Text};
-use crate::text::table::{Table, TableBuilder, TableCell};
-use crate::text::words::{percent, with_interval};
+use crate::report::text::ladder::{Ladder, SeriesByLevel};
+use crate::report::text::table::ColumnKind::{Accuracy, Text};
+use crate::report::text::table::{Table, TableBuilder, TableCell};
+use crate::report::text::words::{percent, with_interval};
 use crate::types::{Axis, AxisLevel};
 use darkqa_score::comparisons::self_agreement::SelfAgreement;
 use darkqa_score::comparisons::self_agreement::cell::{AgreementCell, CellRole};

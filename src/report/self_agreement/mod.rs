@@ -18,12 +18,12 @@ use crate::report::finding_groups::FindingGroups;
 use crate::report::json::{Rows, RunsHead, SummaryRuns, document};
 use crate::report::page::{PageContent, PageHead, PageInputs, page_of};
 use crate::report::products::files;
-use crate::report::report_length::ReportLength;
+use crate::report::sentences::Sentence;
 use crate::report::short::who_is_judged;
-use crate::sentences::Sentence;
-use crate::text::alert::Alert;
-use crate::text::noise_profiles::NoiseProfiles;
-use crate::text::table::Table;
+use crate::report::text::alert::Alert;
+use crate::report::text::noise_profiles::NoiseProfiles;
+use crate::report::text::table::Table;
+use crate::runs::report_length::ReportLength;
 use crate::types::text::counted;
 use darkqa_score::comparisons::self_agreement::SelfAgreement;
 

@@ -1,6 +1,6 @@
 //! Sections of the page on questions without true answers: [`SECTIONS`].
 
-use crate::tables::{ENHANCERS, Section};
+use crate::report::tables::{ENHANCERS, Section};
 
 /// All sections of the page in order.
 pub(super) const SECTIONS: [Section; 8] = [

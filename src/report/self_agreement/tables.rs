@@ -2,14 +2,14 @@
 
 use super::levels::{levels, no_evidence_reason};
 use super::measure::AGREEMENT;
-use crate::tables::{
+use crate::report::tables::{
     agreement_comparisons, commonest_answers, counted_answers, health, missing_threshold_reason,
     reading,
 };
-use crate::text::table::ColumnKind::{self, Count, Number, Percent, Ratio, Share, Text};
-use crate::text::table::SUMMARY;
-use crate::text::table::{Table, TableBuilder, TableCell, TableFormat};
-use crate::text::words::light;
+use crate::report::text::table::ColumnKind::{self, Count, Number, Percent, Ratio, Share, Text};
+use crate::report::text::table::SUMMARY;
+use crate::report::text::table::{Table, TableBuilder, TableCell, TableFormat};
+use crate::report::text::words::light;
 use crate::types::RunGroup;
 use crate::types::text::counted;
 use darkqa_score::answers::confusion::{Confusion, Hallucination};

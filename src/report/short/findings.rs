@@ -4,10 +4,10 @@ use std::fmt::Write;
 
 use super::styled_lines;
 use crate::report::finding_groups::{Finding, FindingGroups};
-use crate::report::report_length::ReportLength;
-use crate::text::alert::{Alert, lines};
-use crate::text::terminal::line;
-use crate::text::wrapped::wrapped;
+use crate::report::text::alert::{Alert, lines};
+use crate::report::text::terminal::line;
+use crate::report::text::wrapped::wrapped;
+use crate::runs::report_length::ReportLength;
 use crate::types::text::counted;
 use crate::types::text::escape_hidden;
 

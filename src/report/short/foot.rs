@@ -2,10 +2,10 @@
 //! ([`about_models`]).
 
 use crate::report::choice_report::ChoiceReport;
-use crate::tables::{control_text, unread_note};
-use crate::text::ladder::Ladder;
-use crate::text::words::{percent, with_interval};
-use crate::text::wrapped::wrapped;
+use crate::report::tables::{control_text, unread_note};
+use crate::report::text::ladder::Ladder;
+use crate::report::text::words::{percent, with_interval};
+use crate::report::text::wrapped::wrapped;
 use crate::types::replies::OBSERVER;
 use darkqa_score::accuracies::AccuracyCell;
 use darkqa_score::choice::ParsingMode;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::text::words::shorten_middle;
+use crate::report::text::words::shorten_middle;
 
 /// Width of the column of a level, in characters.
 pub(super) const LEVEL_WIDTH: usize = 7;

@@ -6,9 +6,9 @@
 use clap::builder::styling::{AnsiColor, Style};
 
 use super::foot::BELOW;
-use crate::sentences::{Sentence, Tone};
-use crate::text::alert::Alert;
-use crate::text::wrapped::wrapped;
+use crate::report::sentences::{Sentence, Tone};
+use crate::report::text::alert::Alert;
+use crate::report::text::wrapped::wrapped;
 use crate::types::text::escape_hidden;
 
 /// Wrapped text of an alert with its sign.

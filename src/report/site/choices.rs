@@ -2,10 +2,10 @@
 
 use super::board::{BoardCell, BoardRow, BoardTable};
 use super::run_link::{GroupDigests, RunLink};
-use crate::tables::missing_threshold_reason;
-use crate::text::table::ColumnKind::{Count, Points, Share, Text, Threshold};
-use crate::text::table::{ColumnKind, Table, TableBuilder, TableCell};
-use crate::text::words::points;
+use crate::report::tables::missing_threshold_reason;
+use crate::report::text::table::ColumnKind::{Count, Points, Share, Text, Threshold};
+use crate::report::text::table::{ColumnKind, Table, TableBuilder, TableCell};
+use crate::report::text::words::points;
 use crate::types::{AxisLevel, Variant, View};
 use darkqa_score::accuracies::Curve;
 use darkqa_score::choice::ParsingMode;

@@ -11,8 +11,8 @@ use serde::Serialize;
 
 use crate::error::{Error, Result};
 use crate::report::json::Rows;
-use crate::text::csv;
-use crate::text::table::Table;
+use crate::report::text::csv;
+use crate::report::text::table::Table;
 
 pub(crate) use choices::{ChoiceRow, choice_rows};
 pub(crate) use content::{DATA, GroupDifference, GroupRows, Ranking, Site, SiteGroup};

@@ -4,9 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::board::{BoardCell, BoardRow, BoardTable};
 use super::run_link::{GroupDigests, RunLink};
-use crate::text::table::ColumnKind::{Count, Share, Text};
-use crate::text::table::{Table, TableBuilder, TableCell};
-use crate::text::words::light;
+use crate::report::text::table::ColumnKind::{Count, Share, Text};
+use crate::report::text::table::{Table, TableBuilder, TableCell};
+use crate::report::text::words::light;
 use crate::types::{AxisLevel, View};
 use darkqa_score::estimate::Estimate;
 use darkqa_score::open::{Group, OpenCell, OpenSummary};

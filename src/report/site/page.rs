@@ -8,7 +8,7 @@ use super::{choices, open};
 use crate::error::Result;
 use crate::report::page::STYLE;
 use crate::report::template::render;
-use crate::text::readable::readable;
+use crate::report::text::readable::readable;
 use crate::types::text::counted;
 
 const PAGE: &str = include_str!("index.html");

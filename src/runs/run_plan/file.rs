@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::report::forecast::Forecast;
+use crate::runs::forecast::Forecast;
 use crate::types::Digest;
 use crate::types::manifests::Identity;
 

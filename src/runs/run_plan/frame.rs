@@ -6,8 +6,7 @@ use std::time::SystemTime;
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
-use crate::dataset::Dataset;
-use crate::images::frames::Source;
+use crate::data::Dataset;
 use crate::types::{Digest, FrameId};
 
 /// Estimated cost of all images and requests of a frame. It depends on the plan alone, so that every shard computes the same division.
@@ -55,22 +54,29 @@ pub(crate) struct PlannedFrame {
 }
 
 impl PlannedFrame {
-    pub(crate) fn new(place: usize, source: &Source, dataset: &Dataset, cost: FrameCost) -> Self {
-        let path = dataset.image_file(&source.name);
+    /// A planned frame with its file. `image` is its size and digest, where models see images.
+    pub(crate) fn new(
+        place: usize,
+        frame: &FrameId,
+        image: (Option<(u32, u32)>, Option<Digest>),
+        dataset: &Dataset,
+        cost: FrameCost,
+    ) -> Self {
+        let path = dataset.image_file(frame);
         let metadata = path.and_then(|path| path.metadata().ok());
         let modified = metadata
             .as_ref()
             .and_then(|metadata| metadata.modified().ok());
-        let size = source.middle().map(|frame| frame.size);
+        let (size, digest) = image;
         Self {
-            frame: source.name.clone(),
-            scene: dataset.scene(&source.name),
+            frame: frame.clone(),
+            scene: dataset.scene(frame),
             path: path.map(ToOwned::to_owned),
             size: metadata.map(|metadata| metadata.len()),
             mtime: modified.and_then(format_utc),
             width: size.map(|(width, _)| width),
             height: size.map(|(_, height)| height),
-            digest: source.digest(),
+            digest,
             cost,
             place,
         }

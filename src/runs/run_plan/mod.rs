@@ -14,10 +14,9 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 use serde::de::DeserializeOwned;
 
-use crate::dataset::Dataset;
+use crate::data::Dataset;
 use crate::error::{Error, Result};
 use crate::files::reading;
-use crate::images::frames::Source;
 use crate::runs::shard::Shard;
 use crate::runs::shard_sources::{WeightedSource, shard_range};
 use crate::store::PLAN;
@@ -149,16 +148,16 @@ impl RunPlan {
         self.questions.iter().map(|question| question.place)
     }
 
-    /// Checks that the images of these sources are the planned ones.
+    /// Checks that these images, given by frame with their digests, are the planned ones.
     ///
     /// # Errors
     /// If a frame has changed or is not planned; names the frame.
-    pub(crate) fn check_sources(&self, sources: &[Source]) -> Result<()> {
-        for source in sources {
-            let Some(digest) = source.digest() else {
-                continue;
-            };
-            let planned = self.frame(&source.name).map(|frame| frame.digest);
+    pub(crate) fn check_images<'a>(
+        &self,
+        images: impl IntoIterator<Item = (&'a FrameId, Digest)>,
+    ) -> Result<()> {
+        for (name, digest) in images {
+            let planned = self.frame(name).map(|frame| frame.digest);
             let problem = match planned {
                 Some(Some(planned)) if planned == digest => continue,
                 Some(Some(_)) => "its image is not the one that was planned",
@@ -168,7 +167,7 @@ impl RunPlan {
                 None => "no question about it is planned",
             };
             return Err(Error::data(
-                format_args!("frame {:?}", source.name.0),
+                format_args!("frame {:?}", name.0),
                 format_args!(
                     "{problem} ({}); restore it, or write the plan again into another --out",
                     self.folder.display()

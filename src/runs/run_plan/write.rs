@@ -11,7 +11,7 @@ use super::file::{FRAMES, PLAN_FILE, PlanCounts, PlanEstimate, PlanFile, QUESTIO
 use super::{PlannedFrame, RunPlan};
 use crate::error::{Error, Result};
 use crate::files::{UNFINISHED, reading};
-use crate::report::forecast::Forecast;
+use crate::runs::forecast::Forecast;
 use crate::store::{self, PLAN};
 use crate::types::manifests::Identity;
 use crate::types::{Digest, RunQuestion};

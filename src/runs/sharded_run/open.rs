@@ -7,7 +7,7 @@ use super::ShardedRun;
 use super::missing::MissingShards;
 use super::stored_shard::no_shard_error;
 use crate::error::{Error, Result};
-use crate::images::notes::thumbnail::MissingThumbnails;
+use crate::runs::missing_thumbnails::MissingThumbnails;
 use crate::runs::run_texts::RunTexts;
 use crate::runs::stored::{
     AnyRun, ExperimentKind, RunLayout, StoredRun, open_questions_error, read_run_manifest,

@@ -16,16 +16,16 @@ pub(crate) fn long_files(files: &Files, most: usize) -> Vec<String> {
         .collect()
 }
 
-/// The imports of rooms and crates that the map does not allow; those of tests count, too.
-pub(crate) fn imports(files: &Files, map: &Map, crates: &[&str]) -> Vec<String> {
+/// The imports of rooms that the map does not allow; those of tests count, too. `aliases` has the rooms behind other names.
+pub(crate) fn imports(files: &Files, map: &Map, aliases: &[(&str, &str)]) -> Vec<String> {
     let mut wrong = Vec::new();
     for (source, part, path) in paths(files) {
         let Some(room) = source.module.first() else {
             continue;
         };
-        let rule = match path.first().map(String::as_str) {
+        let rule = match path.first().map(|name| behind(name, aliases)) {
             None | Some("*") => format!("`{room}` uses the whole crate: name the room"),
-            Some(other) if !map.has(other) && !crates.contains(&other) => {
+            Some(other) if !map.has(other) => {
                 format!("`{room}` uses `crate::{other}`, which is no room of the map")
             }
             Some(other) if !map.allows(room, other) => format!("`{room}` may not use `{other}`"),
@@ -36,12 +36,49 @@ pub(crate) fn imports(files: &Files, map: &Map, crates: &[&str]) -> Vec<String> 
     wrong
 }
 
+/// The imports by which a crate of the workspace uses another that the map does not allow to its room.
+pub(crate) fn crate_imports(files: &Files, map: &Map, aliases: &[(&str, &str)]) -> Vec<String> {
+    let mut wrong = Vec::new();
+    for (source, part) in files
+        .parts_outside_tests()
+        .filter(|(_, part)| part.is_path())
+    {
+        let room = source.path.split('/').next().unwrap_or_default();
+        let name = part
+            .names
+            .first()
+            .and_then(|name| name.strip_prefix("darkqa_"));
+        // The networks are data.
+        if let Some(other) = name.map(|name| behind(name, aliases))
+            && other != "models"
+            && !map.allows(room, other)
+        {
+            wrong.push(at(
+                source,
+                part.line,
+                &format!("`{room}` may not use `{other}`"),
+            ));
+        }
+    }
+    wrong
+}
+
+/// The room behind a name.
+fn behind<'n>(name: &'n str, aliases: &[(&str, &'n str)]) -> &'n str {
+    let alias = aliases.iter().find(|(alias, _)| *alias == name);
+    alias.map_or(name, |(_, room)| *room)
+}
+
 /// The paths by which one command's folder or file uses another command's; those of tests count, too.
 pub(crate) fn commands(files: &Files) -> Vec<String> {
     let mut wrong = Vec::new();
     for (source, part, path) in paths(files) {
-        let is_run = |module: &[String]| module.first().is_some_and(|room| room == "run");
-        if is_run(&source.module) && is_run(&path) && source.module.get(1) != path.get(1) {
+        let is_command = |module: &[String]| {
+            let is_room = module.first().is_some_and(|room| room == "commands");
+            is_room && module.get(1).is_none_or(|command| command != "cli")
+        };
+        let is_own = source.module.get(1) == path.get(1);
+        if is_command(&source.module) && is_command(&path) && !is_own {
             let rule = format!("a command uses `{}`, which is not its own", path.join("::"));
             wrong.push(at(source, part.line, &rule));
         }

@@ -9,7 +9,7 @@ use std::process::Command;
 use crate::support::run::{PROGRAM, called};
 use crate::support::snapshot::redacted;
 use crate::support::table::check_rows;
-use darkqa_ground::labels::space;
+use darkqa_base::labels::space;
 use image::{GrayImage, ImageBuffer, Luma, Rgb, RgbImage};
 use serde_json::{Value, json};
 use tempfile::TempDir;
@@ -450,7 +450,7 @@ fn rule_file_is_recorded_per_question() {
     let rules = out.path().join("rules.toml");
     let built_in = fs::read_to_string(concat!(
         env!("CARGO_MANIFEST_DIR"),
-        "/src/questions/src/rules.toml"
+        "/src/questions/rules.toml"
     ))
     .unwrap();
     fs::write(&rules, built_in.replace("crushed = 3 ", "crushed = 4 ")).unwrap();

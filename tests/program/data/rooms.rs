@@ -5,8 +5,8 @@ use std::sync::LazyLock;
 
 use crate::support::run::{Bench, records, words};
 use crate::support::snapshot::each;
+use darkqa_base::types::{Digest, Family, Frame, FrameId};
 use darkqa_eval::internals::dataset::{DataPlace, Dataset};
-use darkqa_ground::types::{Digest, Family, Frame, FrameId};
 use darkqa_questions::balance::BalanceMode;
 use darkqa_questions::colors::Palette;
 use darkqa_questions::room::RoomSource;
@@ -15,12 +15,12 @@ use darkqa_questions::rules::ClassFlag;
 use darkqa_questions::rules::Rules;
 use darkqa_questions::statistics::measure;
 use darkqa_questions::{Generated, GeneratedQuestion, QuestionRequest, generate};
-use darkqa_scenes::Room;
-use darkqa_scenes::RoomTruth;
-use darkqa_scenes::Rooms;
-use darkqa_scenes::ThingTruth;
-use darkqa_scenes::VERSION;
-use darkqa_scenes::labels;
+use darkqa_rooms::Room;
+use darkqa_rooms::RoomTruth;
+use darkqa_rooms::Rooms;
+use darkqa_rooms::ThingTruth;
+use darkqa_rooms::VERSION;
+use darkqa_rooms::labels;
 use rayon::prelude::*;
 
 /// What is seen of a frame by number, and what its generator knows of it.

@@ -12,8 +12,8 @@ use super::recordings::frames;
 use crate::support::run::{Bench, Called, words};
 use crate::support::snapshot::{on_one_line, redacted};
 use crate::support::tools::{has_ffmpeg, skip};
-use darkqa_picture::decode_rule::ColourRule;
-use darkqa_picture::{DecodeRule, ImageFile};
+use darkqa_pictures::decode_rule::ColourRule;
+use darkqa_pictures::{DecodeRule, ImageFile};
 
 /// A program `ffmpeg` that writes four images, half a second apart, as ffmpeg does.
 fn with_ffmpeg(bench: &Bench, end: &str) {

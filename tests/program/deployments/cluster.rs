@@ -1,4 +1,4 @@
-//! The manifests for Kubernetes and the scripts in `src/run/cluster`: their flags exist, and they agree with each other.
+//! The manifests for Kubernetes and the scripts in `src/commands/cluster`: their flags exist, and they agree with each other.
 
 use std::collections::BTreeSet;
 use std::ffi::OsString;
@@ -18,7 +18,7 @@ fn file(name: &str) -> String {
 
 fn path(name: &str) -> PathBuf {
     let root = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
-    root.join("src/run/cluster").join(name)
+    root.join("src/commands/cluster").join(name)
 }
 
 /// The words after `args:` in a manifest.

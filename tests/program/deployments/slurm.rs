@@ -49,7 +49,7 @@ fn array(bench: &Bench, tasks: usize, args: &[&str]) -> Command {
         .args(["--wait", &format!("--array=0-{}%2", tasks - 1)])
         .arg(concat!(
             env!("CARGO_MANIFEST_DIR"),
-            "/src/run/cluster/slurm.sh"
+            "/src/commands/cluster/slurm.sh"
         ))
         .args(args)
         .current_dir(bench.path(""))

@@ -8,16 +8,16 @@ use crate::support::snapshot::redacted;
 use crate::support::table::check_rows;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
+use darkqa_base::types::{
+    Choices, Digest, FailureKind, Family, Finish, FrameId, Question, QuestionId, Reply, Rgb, View,
+};
 use darkqa_eval::internals::ask::{
     Access, BaseUrl, Call, Constrain, Endpoint, ExtraFields, ImageDetail, Message, Model,
     Parameters, Prompts, Query, Random, Remote, Script, Secret, Sending, SettingsOrigin,
     Temperature, TokenField, WireSetting,
 };
-use darkqa_ground::types::{
-    Choices, Digest, FailureKind, Family, Finish, FrameId, Question, QuestionId, Reply, Rgb, View,
-};
-use darkqa_picture::Payload;
-use darkqa_picture::PayloadFormat;
+use darkqa_pictures::Payload;
+use darkqa_pictures::PayloadFormat;
 use serde_json::{Value, json};
 
 const KEY: &str = "sk-very-secret-0123";

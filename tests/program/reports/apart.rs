@@ -181,7 +181,7 @@ fn shards_of_observer_are_one_light() {
 #[test]
 fn runs_under_other_rules_keep_controls() {
     let bench = Bench::new();
-    let rules = include_str!("../../../src/questions/src/rules.toml");
+    let rules = include_str!("../../../src/questions/rules.toml");
     let own = rules.replace("detail_ppm = 500 ", "detail_ppm = 501 ");
     assert_ne!(own, rules);
     bench.file("own.toml", own);

@@ -262,7 +262,7 @@ fn what_was_sent_is_made_again() {
         let frame = record["frame"].as_str().unwrap();
         let file = fs::read(bench.path(&format!("run/shown/{frame}_{condition}.png"))).unwrap();
         assert_eq!(
-            json!(darkqa_ground::types::Digest::from_bytes(&file)),
+            json!(darkqa_base::types::Digest::from_bytes(&file)),
             record["image"]["digest"]
         );
     }

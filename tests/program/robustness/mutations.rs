@@ -9,9 +9,9 @@ use std::io::Cursor;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
-use darkqa_picture::DecodeRule;
-use darkqa_picture::ImageFile;
-use darkqa_picture::decode_rule::MAX_PIXELS;
+use darkqa_pictures::DecodeRule;
+use darkqa_pictures::ImageFile;
+use darkqa_pictures::decode_rule::MAX_PIXELS;
 use image::{DynamicImage, ImageFormat, Rgb};
 
 use exr::prelude::Compression;

@@ -93,7 +93,7 @@ impl Scene {
             json!({"id": "color", "question": "What color?", "choices": ["red", "blue"]}),
         ];
         bench.file("bank.jsonl", bank.map(|line| line.to_string()).join("\n"));
-        let rules = include_str!("../../../src/questions/src/rules.toml");
+        let rules = include_str!("../../../src/questions/rules.toml");
         bench.file("rules.toml", rules.replace("gap_mm = 300", "gap_mm = 301"));
         onnx::gain(0.5).write(&bench.path(""), "one.onnx");
         onnx::gamma(0.5).write(&bench.path(""), "two.onnx");
@@ -453,19 +453,16 @@ const ELSEWHERE: [(&str, &str); 60] = [
     ("--allow", KEYS),
     ("--stop", KEYS),
     ("--map", "tests/program/data/ready_made.rs"),
-    ("--config-name", "src/dataset/ready_made/tests/shapes.rs"),
-    ("--split", "src/dataset/ready_made/tests/shapes.rs"),
-    ("--rows", "src/dataset/ready_made/tests/shapes.rs"),
-    ("--multi-image", "src/dataset/ready_made/tests/shapes.rs"),
-    ("--no-image", "src/dataset/ready_made/tests/shapes.rs"),
+    ("--config-name", "src/data/ready_made/tests/shapes.rs"),
+    ("--split", "src/data/ready_made/tests/shapes.rs"),
+    ("--rows", "src/data/ready_made/tests/shapes.rs"),
+    ("--multi-image", "src/data/ready_made/tests/shapes.rs"),
+    ("--no-image", "src/data/ready_made/tests/shapes.rs"),
     ("--open", "tests/program/data/ready_made.rs"),
-    ("--several", "src/dataset/ready_made/tests/refusals.rs"),
-    ("--bad", "src/dataset/ready_made/tests/refusals.rs"),
+    ("--several", "src/data/ready_made/tests/refusals.rs"),
+    ("--bad", "src/data/ready_made/tests/refusals.rs"),
     ("--data-root", "tests/program/data/ready_made.rs"),
-    (
-        "--keep-instructions",
-        "src/dataset/ready_made/tests/shapes.rs",
-    ),
+    ("--keep-instructions", "src/data/ready_made/tests/shapes.rs"),
     ("--light", "tests/program/data/photographs.rs"),
     ("--pairs", "tests/program/data/photographs.rs"),
     ("--label-folders", "tests/program/data/photographs.rs"),

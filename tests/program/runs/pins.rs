@@ -15,7 +15,7 @@ use crate::support::snapshot::redacted;
 use crate::support::table::check_rows;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
-use darkqa_ground::types::Digest;
+use darkqa_base::types::Digest;
 use serde_json::{Value, json};
 
 /// The lines of a file of JSON objects.

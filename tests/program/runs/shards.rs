@@ -263,7 +263,7 @@ fn slurm_script_restarts_stopped_task() {
     });
     bench.program("scontrol", "echo \"$@\" >> told");
     std::os::unix::fs::symlink(PROGRAM, bench.path("bin/darkqa-eval")).unwrap();
-    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/src/run/cluster/slurm.sh");
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/src/commands/cluster/slurm.sh");
     let base = mock.base_url();
     let args = model_args(
         &base,

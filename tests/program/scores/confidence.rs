@@ -8,7 +8,7 @@
 )]
 
 use crate::support::made::record;
-use darkqa_ground::types::{Condition, OptionProbabilities, Record};
+use darkqa_base::types::{Condition, OptionProbabilities, Record};
 use darkqa_score::bootstrap::Resamples;
 use darkqa_score::calibration::Calibration;
 use darkqa_score::calibration::calibrations;

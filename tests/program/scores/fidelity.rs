@@ -4,7 +4,7 @@ use std::fs;
 
 use crate::support::made::record;
 use crate::support::run::{Bench, records, words};
-use darkqa_ground::types::{Condition, Digest, ImageFacts, ImageFidelity, Record};
+use darkqa_base::types::{Condition, Digest, ImageFacts, ImageFidelity, Record};
 use darkqa_score::cluster::FrameTies;
 use darkqa_score::findings::Findings;
 use darkqa_score::photographs::FidelityFindings;

@@ -14,11 +14,11 @@ use std::fmt::Write as _;
 
 use crate::support::made::record;
 use crate::support::table::check_rows;
-use darkqa_eval::Kind;
-use darkqa_ground::types::{
+use darkqa_base::types::{
     AxisLevel, Condition, Degradation, EnhancerName, Family, ParsedAnswer, Record, Severity,
     Variant,
 };
+use darkqa_eval::Kind;
 use darkqa_score::accuracies::curves;
 use darkqa_score::bootstrap::Resamples;
 use darkqa_score::choice::ParsingMode;

@@ -99,42 +99,44 @@ fn allowed_imports_are_not_reported() {
 fn commands_that_use_another_are_found() {
     check(
         rules::commands,
-        &["src/run/show.rs:1: a command uses `run::export::read`, which is not its own"],
+        &["src/commands/show.rs:1: a command uses `commands::export::read`, which is not its own"],
         &[
-            "run/show.rs: use crate::run::export::read;",
-            "run/show.rs: use super::export::read;",
-            "run/show.rs: #[cfg(test)] mod tests { use crate::run::export::read; }",
+            "commands/show.rs: use crate::commands::export::read;",
+            "commands/show.rs: use super::export::read;",
+            "commands/show.rs: #[cfg(test)] mod tests { use crate::commands::export::read; }",
         ],
     );
     check(
         rules::commands,
-        &["src/run/show.rs:1: a command uses `run`, which is not its own"],
+        &["src/commands/show.rs:1: a command uses `commands`, which is not its own"],
         &[
-            "run/show.rs: use crate::run;",
-            "run/show.rs: use super as all;",
+            "commands/show.rs: use crate::commands;",
+            "commands/show.rs: use super as all;",
         ],
     );
     check(
         rules::commands,
-        &["src/run/show.rs:1: a command uses `run::*`, which is not its own"],
-        &["run/show.rs: use super::*;"],
+        &["src/commands/show.rs:1: a command uses `commands::*`, which is not its own"],
+        &["commands/show.rs: use super::*;"],
     );
     check(
         rules::commands,
-        &["src/run/mod.rs:1: a command uses `run::show::go`, which is not its own"],
-        &["run/mod.rs: fn f() { show::go() } ++ run/show.rs"],
+        &["src/commands/mod.rs:1: a command uses `commands::show::go`, which is not its own"],
+        &["commands/mod.rs: fn f() { show::go() } ++ commands/show.rs"],
     );
     check(
         rules::commands,
-        &["src/run/export/set.rs:1: a command uses `run::show::go`, which is not its own"],
-        &["run/export/set.rs: fn f() { super::super::show::go() }"],
+        &[
+            "src/commands/export/set.rs:1: a command uses `commands::show::go`, which is not its own",
+        ],
+        &["commands/export/set.rs: fn f() { super::super::show::go() }"],
     );
     check(
         rules::commands,
         &[],
         &[
-            "run/export/set.rs: use super::folder; use crate::run::export::go; use crate::job;",
-            "cli/mod.rs: use crate::run::{export, show};",
+            "commands/export/set.rs: use super::folder; use crate::commands::export::go; use crate::engine;",
+            "commands/cli/mod.rs: use crate::commands::{export, show};",
         ],
     );
 }

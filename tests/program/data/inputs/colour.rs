@@ -10,9 +10,9 @@ use crate::support::image_files::{
 use crate::support::run::{Bench, words};
 use crate::support::snapshot::redacted;
 use crate::support::tiff_files::{Order, Page, tiff};
-use darkqa_picture::DecodeRule;
-use darkqa_picture::ImageFile;
-use darkqa_picture::decode_rule::ColourRule;
+use darkqa_pictures::DecodeRule;
+use darkqa_pictures::ImageFile;
+use darkqa_pictures::decode_rule::ColourRule;
 use image::{Rgb, RgbImage};
 use serde_json::{Value, json};
 

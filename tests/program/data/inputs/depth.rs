@@ -6,11 +6,11 @@ use crate::support::icc_files::{DISPLAY_P3, rgb_profile, srgb_curve};
 use crate::support::image_files::{chunk, profile_chunk, with_chunks};
 use crate::support::run::{Bench, words};
 use crate::support::tiff_files::{Order, Page, tiff};
-use darkqa_ground::types::{Pixels, Severity};
+use darkqa_base::types::{Pixels, Severity};
 use darkqa_light::exposure::expose;
-use darkqa_picture::DecodeRule;
-use darkqa_picture::ImageFile;
-use darkqa_picture::decode_rule::Transfer;
+use darkqa_pictures::DecodeRule;
+use darkqa_pictures::ImageFile;
+use darkqa_pictures::decode_rule::Transfer;
 use image::{ImageBuffer, Rgb, RgbImage};
 use serde_json::Value;
 

@@ -2,8 +2,8 @@
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
-use darkqa_picture::DecodeRule;
-use darkqa_picture::ImageFile;
+use darkqa_pictures::DecodeRule;
+use darkqa_pictures::ImageFile;
 use image::{ImageFormat, Rgb, RgbImage};
 use serde_json::json;
 

@@ -7,13 +7,13 @@ use crate::support::exr_files::{
 };
 use crate::support::run::{Bench, records, words};
 use crate::support::snapshot::redacted;
-use darkqa_ground::types::{FrameId, Light, Pixels, Severity};
+use darkqa_base::types::{FrameId, Light, Pixels, Severity};
 use darkqa_light::exposure::expose;
 use darkqa_light::raw::negative::Negative;
 use darkqa_light::{CameraModel, NoiseKey, NoiseProfile, Synthesis};
-use darkqa_picture::DecodeRule;
-use darkqa_picture::ImageFile;
-use darkqa_picture::decode_rule::ColourRule;
+use darkqa_pictures::DecodeRule;
+use darkqa_pictures::ImageFile;
+use darkqa_pictures::decode_rule::ColourRule;
 use exr::prelude::{Compression, FlatSamples, f16};
 use image::RgbImage;
 use serde_json::Value;

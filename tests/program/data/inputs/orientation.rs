@@ -4,8 +4,8 @@ use std::fs;
 
 use crate::support::image_files::{exif, jpeg, png, seen, turned_jpeg, turned_png};
 use crate::support::run::{Bench, records, words};
-use darkqa_picture::DecodeRule;
-use darkqa_picture::ImageFile;
+use darkqa_pictures::DecodeRule;
+use darkqa_pictures::ImageFile;
 use image::{Rgb, RgbImage};
 use serde_json::{Value, json};
 

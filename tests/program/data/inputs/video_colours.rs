@@ -6,8 +6,8 @@ use crate::support::image_files::{
     with_chunks,
 };
 use crate::support::run::{Bench, words};
-use darkqa_picture::decode_rule::ColourRule;
-use darkqa_picture::{DecodeRule, ImageFile};
+use darkqa_pictures::decode_rule::ColourRule;
+use darkqa_pictures::{DecodeRule, ImageFile};
 use image::{Rgb, RgbImage};
 
 /// XYZ of the primaries of BT.2020 at D50 (ITU-R BT.2020-2, adapted by Bradford).

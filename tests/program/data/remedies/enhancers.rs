@@ -1,4 +1,4 @@
-//! Remedies of `src/enhance`, `src/images/enhancement` and `src/run/enhance`.
+//! Remedies of `src/enhance`, `src/engine/images/enhancement` and `src/commands/enhance`.
 
 use super::{Bench, ROW, Remedy, Unfollowed, Why, photograph};
 use crate::support::onnx::{self, Graph};

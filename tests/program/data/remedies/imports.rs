@@ -1,4 +1,4 @@
-//! Remedies of `src/import` and `src/run/import`.
+//! Remedies of `src/data/import` and `src/commands/import`.
 
 use std::fs;
 

@@ -57,14 +57,13 @@ enum Why {
 }
 
 /// Folders and files with messages about data, imports and enhancers, in `src/`.
-const PLACES: [&str; 7] = [
-    "dataset/",
-    "import/",
-    "enhance/src/",
-    "images/enhancement/",
-    "run/import",
-    "run/enhance/",
-    "run/realism/",
+const PLACES: [&str; 6] = [
+    "data/",
+    "enhance/",
+    "engine/images/enhancement/",
+    "commands/import",
+    "commands/enhance/",
+    "commands/realism/",
 ];
 
 fn nothing(_: &Bench) {}

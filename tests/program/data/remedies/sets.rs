@@ -1,4 +1,4 @@
-//! Remedies of `src/dataset`.
+//! Remedies of `src/data`.
 
 use super::{Bench, ROW, Remedy, Unfollowed, Why, photograph};
 use crate::support::image_files::png;
@@ -664,14 +664,14 @@ pub(super) const UNFOLLOWED: &[Unfollowed] = &[
     Unfollowed {
         says: "--map {}={}",
         why: Why::Test(
-            "src/dataset/ready_made/tests/user_shapes.rs",
+            "src/data/ready_made/tests/user_shapes.rs",
             "error_for_conversations_suggests_a_map",
         ),
     },
     Unfollowed {
         says: "--skip bad={}%",
         why: Why::Test(
-            "src/dataset/ready_made/omissions/skip_bad.rs",
+            "src/data/ready_made/omissions/skip_bad.rs",
             "larger_share_is_refused_with_the_flag_that_allows_it",
         ),
     },

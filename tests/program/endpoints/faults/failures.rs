@@ -1,7 +1,7 @@
 //! Failures that do not pass: of one request, or of every request to the endpoint.
 
+use darkqa_base::types::FailureKind;
 use darkqa_eval::internals::ask::Reach;
-use darkqa_ground::types::FailureKind;
 use serde_json::json;
 
 use super::{ask, gzipped};

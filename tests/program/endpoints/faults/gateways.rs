@@ -1,7 +1,7 @@
 //! Gateways that give up on long requests, streams that break off, and servers that load a model: what is sent again, and how often.
 
+use darkqa_base::types::{FailureKind, Finish};
 use darkqa_eval::internals::ask::{Parameters, Reach, Sending, WireSetting};
-use darkqa_ground::types::{FailureKind, Finish};
 use serde_json::Value;
 
 use super::{Outcome, PIECE, ask, ask_with, sending};

@@ -13,12 +13,12 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use crate::support::endpoint::{Answer, MockEndpoint, Request};
+use darkqa_base::types::{Reply, Rgb};
 use darkqa_eval::internals::ask::{
     Access, AskError, Endpoint, Message, Parameters, Remote, Secret, Sending,
 };
-use darkqa_ground::types::{Reply, Rgb};
-use darkqa_picture::Payload;
-use darkqa_picture::PayloadFormat;
+use darkqa_pictures::Payload;
+use darkqa_pictures::PayloadFormat;
 use serde_json::Value;
 
 fn sending() -> Sending {

@@ -1,6 +1,6 @@
 //! Shapes of replies in which an answer is found.
 
-use darkqa_ground::types::Finish;
+use darkqa_base::types::Finish;
 use serde_json::json;
 
 use super::{PIECE, ask, completion, gzipped};

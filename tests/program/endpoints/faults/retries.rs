@@ -2,8 +2,8 @@
 
 use std::time::{Duration, SystemTime};
 
+use darkqa_base::types::FailureKind;
 use darkqa_eval::internals::ask::{Parameters, Reach, Sending};
-use darkqa_ground::types::FailureKind;
 use serde_json::json;
 
 use super::{PIECE, ask, ask_with, completion, gzip, sending};

@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
+use darkqa_base::types::{FailureKind, Finish, Reply};
 use darkqa_eval::internals::ask::{Parameters, Reach, Sending, WireSetting};
-use darkqa_ground::types::{FailureKind, Finish, Reply};
 use serde_json::{Value, json};
 
 use super::{ask, ask_with, sending};

@@ -4,7 +4,7 @@ use std::fs;
 use std::io::Cursor;
 use std::path::Path;
 
-use darkqa_ground::types::FrameId;
+use darkqa_base::types::FrameId;
 use darkqa_light::raw::Bayer;
 use darkqa_light::raw::noise::{Term, add as add_noise};
 use darkqa_light::{Amplify, CameraModel, CameraState, NoiseKey, Sampling};

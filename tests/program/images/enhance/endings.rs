@@ -2,8 +2,8 @@
 
 use std::time::{Duration, Instant};
 
+use darkqa_base::types::Rgb;
 use darkqa_enhance::TimeLimit;
-use darkqa_ground::types::Rgb;
 
 use super::{fault, image, loaded, open};
 use crate::support::onnx;

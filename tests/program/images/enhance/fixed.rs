@@ -1,8 +1,8 @@
 //! Models of one size, stated by their graph or frozen by tracing: filled, cut, resized or refused.
 
+use darkqa_base::types::Rgb;
+use darkqa_base::types::SizeLog;
 use darkqa_enhance::Fitting;
-use darkqa_ground::types::Rgb;
-use darkqa_ground::types::SizeLog;
 
 use super::{image, loaded, open, stated};
 use crate::support::onnx;

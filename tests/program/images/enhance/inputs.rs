@@ -2,8 +2,8 @@
 
 use std::num::NonZeroUsize;
 
+use darkqa_base::types::Rgb;
 use darkqa_enhance::{Enhancer, ModelFile, Tiling};
-use darkqa_ground::types::Rgb;
 
 use super::{fault, image, map, open, runtime, stated};
 use crate::support::onnx::{self, Graph, Size, Type};

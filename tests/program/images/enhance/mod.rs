@@ -15,8 +15,8 @@ use std::path::{Path, PathBuf};
 
 use crate::support::onnx::{self, Graph};
 use crate::support::snapshot::redacted;
+use darkqa_base::types::Rgb;
 use darkqa_enhance::{Enhancer, Install, ModelFile, Runtime, RuntimeSearch};
-use darkqa_ground::types::Rgb;
 use tempfile::TempDir;
 
 fn runtime() -> Runtime {

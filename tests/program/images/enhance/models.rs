@@ -2,8 +2,8 @@
 
 use std::num::NonZeroUsize;
 
+use darkqa_base::types::Rgb;
 use darkqa_enhance::{Enhancer, ModelFile};
-use darkqa_ground::types::Rgb;
 
 use super::{fault, image, loaded, map, open, runtime, stated};
 use crate::support::onnx::Size::{Known, Named};

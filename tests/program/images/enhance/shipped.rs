@@ -2,12 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
+use darkqa_base::types::{Rgb, Severity};
 use darkqa_enhance::Enhancer;
-use darkqa_ground::types::{Rgb, Severity};
 use darkqa_light::exposure::expose;
 use darkqa_light::raw::negative::Negative;
 use darkqa_light::{NoiseKey, Synthesis};
-use darkqa_scenes::Rooms;
+use darkqa_rooms::Rooms;
 
 use super::open;
 use crate::support::onnx;

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
+use darkqa_base::types::Rgb;
 use darkqa_enhance::ModelFile;
-use darkqa_ground::types::Rgb;
 
 use super::{fault, image, loaded, map, open, stated};
 use crate::support::onnx;

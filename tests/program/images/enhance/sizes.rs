@@ -2,8 +2,8 @@
 
 use std::num::NonZeroUsize;
 
+use darkqa_base::types::Rgb;
 use darkqa_enhance::Tiling;
-use darkqa_ground::types::Rgb;
 
 use super::{image, loaded, stated};
 use crate::support::onnx;

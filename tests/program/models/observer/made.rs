@@ -3,8 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
+use darkqa_base::types::{Digest, Family, Frame, FrameId, Labels};
 use darkqa_eval::{Degradation, Question, Rgb};
-use darkqa_ground::types::{Digest, Family, Frame, FrameId, Labels};
 use darkqa_light::{NoiseKey, Synthesis, degrade};
 use darkqa_questions::balance::BalanceMode;
 use darkqa_questions::colors::Palette;
@@ -14,8 +14,8 @@ use darkqa_questions::room::RoomSource;
 use darkqa_questions::rules::Rules;
 use darkqa_questions::statistics::measure;
 use darkqa_questions::{QuestionRequest, generate};
-use darkqa_scenes::Rooms;
-use darkqa_scenes::labels;
+use darkqa_rooms::Rooms;
+use darkqa_rooms::labels;
 use darkqa_score::estimate::Estimate;
 use rayon::prelude::*;
 

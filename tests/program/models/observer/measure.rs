@@ -4,8 +4,8 @@
 
 #![expect(clippy::print_stdout, reason = "the measured figures")]
 
-use darkqa_ground::types::Control;
-use darkqa_scenes::Rooms;
+use darkqa_base::types::Control;
+use darkqa_rooms::Rooms;
 
 use super::local::{CHANGES, Elsewhere};
 use super::made::{Asked, INVENTING, Outcome, Set, degraded, invented};

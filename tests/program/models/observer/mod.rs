@@ -8,11 +8,11 @@ mod run;
 use std::sync::LazyLock;
 
 use crate::support::table::check_rows;
+use darkqa_base::types::Control;
+use darkqa_base::types::{Digest, Family};
 use darkqa_eval::Rgb;
-use darkqa_ground::types::Control;
-use darkqa_ground::types::{Digest, Family};
 use darkqa_light::{CameraModel, NoiseProfile, Synthesis};
-use darkqa_scenes::Rooms;
+use darkqa_rooms::Rooms;
 
 use local::{CHANGES, Change, Elsewhere};
 use made::{Asked, Outcome, Set, degraded, invented, mapped};

@@ -184,7 +184,7 @@ fn single_scene_control_shuffles_tiles() {
 fn rules_make_questions_and_answers_alike() {
     let bench = Bench::new();
     bench.rooms("frames", 6, "160x120");
-    let rules = include_str!("../../../../src/questions/src/rules.toml");
+    let rules = include_str!("../../../../src/questions/rules.toml");
     let own = rules.replace(
         "Is there {article} {object} in the image?",
         "Can {article} {object} be seen?",

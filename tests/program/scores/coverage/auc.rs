@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::support::made::record;
-use darkqa_ground::types::{
+use darkqa_base::types::{
     Condition, Digest, Family, ImageFacts, ImageFidelity, ParsedAnswer, Record,
 };
 use darkqa_score::cluster::Clusters;

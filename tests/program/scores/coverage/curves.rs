@@ -1,8 +1,8 @@
 //! Intervals of thresholds and of areas.
 
 use super::*;
+use darkqa_base::types::{AxisLevel, Severity};
 use darkqa_eval::Kind;
-use darkqa_ground::types::{AxisLevel, Severity};
 use darkqa_score::threshold::LevelCounts;
 
 /// Guessing among three choices.

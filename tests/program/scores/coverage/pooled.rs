@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::support::made::record;
+use darkqa_base::types::{Condition, Degradation, ParsedAnswer, Record, Severity};
 use darkqa_eval::Kind;
-use darkqa_ground::types::{Condition, Degradation, ParsedAnswer, Record, Severity};
 use darkqa_score::choice::ParsingMode;
 use darkqa_score::cluster::Clusters;
 use darkqa_score::cluster::FrameTies;

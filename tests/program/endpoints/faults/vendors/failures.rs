@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
+use darkqa_base::types::FailureKind;
 use darkqa_eval::internals::ask::{Constrain, ExtraFields, Parameters, Reach};
-use darkqa_ground::types::FailureKind;
 use serde_json::{Value, json};
 
 use super::{none_spent, of_field, plain, routed};

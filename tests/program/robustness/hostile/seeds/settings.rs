@@ -9,11 +9,8 @@ pub(super) fn make(bench: &Bench) {
         let path = format!("{}/{name}", env!("CARGO_MANIFEST_DIR"));
         std::fs::read(path).unwrap()
     };
-    bench.file("rules.toml", source("src/questions/src/rules.toml"));
-    bench.file(
-        "camera.toml",
-        source("src/light/src/camera/nikon-d850.toml"),
-    );
+    bench.file("rules.toml", source("src/questions/rules.toml"));
+    bench.file("camera.toml", source("src/light/camera/nikon-d850.toml"));
     bench.file("prompts/choice.txt", source("prompts/choice.txt"));
     bench.file("prompts/blind.txt", source("prompts/blind.txt"));
     bench.file(

@@ -1,0 +1,363 @@
+//! The data and models of an evaluation, opened and checked: [`ChoiceSetup`].
+
+use std::collections::HashMap;
+use std::path::Path;
+use std::sync::Arc;
+
+use super::controls::{AddedControls, is_other_room};
+use super::other_room::OtherRooms;
+use super::plan_identity::plan_identity;
+use super::settings::Evaluation;
+use super::unnamed_scenes::unnamed_scenes;
+use crate::ask::{Model, Random};
+use crate::data::Dataset;
+use crate::engine::dark_already;
+use crate::engine::images::enhancement::evenly_spaced_indices;
+use crate::engine::images::frames::{Source, first_question_per_frame, inspect_all, photographs};
+use crate::engine::images::progress::Progress;
+use crate::engine::images::recipes::Recipe;
+use crate::engine::images::trials::questions::{
+    QuestionBank, open_data, open_without_generating, select,
+};
+use crate::engine::images::trials::{check_enhanced, conditions};
+use crate::engine::models::{self, ModelName, ModelUnderTest};
+use crate::engine::observer::Observer;
+use crate::engine::room_net::RoomNet;
+use crate::engine::settings::JobSettings;
+use crate::error::Result;
+use crate::runs::shard_sources::shard_questions;
+use crate::types::manifests::PartPlace;
+use crate::types::{Condition, Digest, FrameId, Question, QuestionId, SetLight, TreatmentSet};
+use darkqa_enhance::{FRAMES, ModelFile};
+use darkqa_questions::observer::is_in_rulebook;
+use darkqa_questions::rules::Rules;
+
+/// Data and models of an evaluation, opened and checked. Nothing has been asked or written yet.
+pub(super) struct ChoiceSetup<'a> {
+    pub(super) config: &'a Evaluation,
+    pub(super) dataset: Arc<Dataset>,
+    pub(super) questions: Vec<Question>,
+    /// Questions for the control `observer:other-room` whose image belongs to this run or shard.
+    pub(super) with_other_rooms: Vec<Question>,
+    pub(super) other_rooms: OtherRooms,
+    pub(super) sources: Vec<Source>,
+    /// In a shard, the sources of the whole run that enhancers are tried on.
+    pub(super) probe_sources: Vec<Source>,
+    /// Position of the sources within the whole run; `None` if this is the whole run.
+    pub(super) part: Option<PartPlace>,
+    /// Index of each frame in `sources`.
+    pub(super) places: HashMap<FrameId, usize>,
+    /// Position of each question among all selected ones, for models that are asked only the first few.
+    pub(super) question_places: HashMap<QuestionId, usize>,
+    /// Position of each question among all questions of the data.
+    pub(super) file_places: HashMap<QuestionId, usize>,
+    /// Digest of each frame that a question is about, over its file or all its files. Empty if no image is read.
+    pub(super) digests: HashMap<FrameId, Digest>,
+    pub(super) models: Vec<ModelUnderTest>,
+    pub(super) conditions: Vec<Condition>,
+    pub(super) recipe: Recipe,
+    /// Digest of the questions that are asked about every image; `None` if questions have answers.
+    pub(super) bank: Option<Digest>,
+    /// Mean linear luminance of a sample of the frames, and the sample size; `None` if the set is not dark.
+    pub(super) brightness: Option<(f64, usize)>,
+}
+
+impl<'a> ChoiceSetup<'a> {
+    /// Opens the data and the models. Also returns the files of the enhancers, which are read but not yet loaded.
+    pub(super) fn open(
+        config: &'a Evaluation,
+        progress: &Progress,
+    ) -> Result<(Self, Vec<ModelFile>)> {
+        let job = &config.job;
+        // If every model is blind, no image is read and no enhancer is opened.
+        let shows_images = job.shows_images();
+        let enhancer_files = if shows_images {
+            job.enhancers()?
+        } else {
+            Vec::new()
+        };
+        let (dataset, selected) = selected_data(config, progress)?;
+        let dataset = Arc::new(dataset);
+        let file_places = file_places(config, &dataset, &selected);
+        let other_rooms = OtherRooms::new(&selected, |frame| dataset.scene(frame));
+        let controls = AddedControls::new(config, other_rooms.is_some())?;
+        let (questions, part) = shard_questions(
+            selected.clone(),
+            job.shard,
+            |question| question.frame.0.clone(),
+            |question| dataset.scene(&question.frame),
+            |frame| config.plan.as_ref().map_or(1, |plan| plan.weight(frame)),
+        )?;
+        let models = open_models(config, &controls, &dataset, &questions)?;
+        let mut sources = if shows_images {
+            inspect_all(&dataset, &questions, progress)?
+        } else {
+            first_question_per_frame(&questions)
+                .into_iter()
+                .map(|question| Source::without_frames(question.frame.clone()))
+                .collect()
+        };
+        if let Some(plan) = &config.plan {
+            let images = sources.iter();
+            plan.check_images(images.filter_map(|source| Some((&source.name, source.digest()?))))?;
+        }
+        if !job.light.matches.is_empty() {
+            photographs::measure(&*dataset, &mut sources)?;
+        }
+        photographs::check_matches(&sources, &job.light.matches)?;
+        photographs::print_darkness(&*dataset, &sources, progress);
+        dark_already::print_note(job, progress);
+        print_raw_photographs(job, &sources, progress);
+        let mut recipe = Recipe::new(&job.light.kinds, job.format, job.max_side, &enhancer_files);
+        if shows_images {
+            recipe = recipe.with_enhanced_images(&job.enhancers.enhanced)?;
+        }
+        let conditions = conditions(
+            &job.light,
+            &photographs::names(&sources),
+            job.enhancers.on(),
+            &recipe.enhancer_names(),
+        );
+        let brightness = (job.set_light == SetLight::Dark)
+            .then(|| dark_already::brightness(&*dataset, &sources))
+            .flatten();
+        let probe_sources = if part.is_some() && !enhancer_files.is_empty() {
+            probe_sources(&dataset, &selected)
+        } else {
+            Vec::new()
+        };
+        let mut setup = Self {
+            config,
+            probe_sources,
+            places: sources
+                .iter()
+                .map(|source| source.name.clone())
+                .zip(0..)
+                .collect(),
+            question_places: selected
+                .iter()
+                .map(|question| question.id.clone())
+                .zip(0..)
+                .collect(),
+            file_places,
+            digests: digests(&sources),
+            sources,
+            part,
+            models,
+            bank: config.bank.as_ref().map(QuestionBank::digest).transpose()?,
+            conditions,
+            brightness,
+            recipe,
+            questions,
+            with_other_rooms: Vec::new(),
+            other_rooms: other_rooms.unwrap_or_default(),
+            dataset,
+        };
+        if shows_images && setup.models.iter().any(is_other_room) {
+            setup.add_other_rooms(selected)?;
+        }
+        if shows_images {
+            check_enhanced(&setup.conditions, &job.enhancers)?;
+        }
+        setup.recipe.check(&setup.sources, &setup.conditions)?;
+        controls.print(progress);
+        print_training(config, progress);
+        Ok((setup, enhancer_files))
+    }
+
+    /// Prints the inferred column mapping of a ready-made set, and warns about unnamed scenes.
+    pub(super) fn print_column_mapping(&self, progress: &Progress) {
+        for line in self.dataset.printed_summary() {
+            progress.note(line);
+        }
+        if let Some(warning) = unnamed_scenes(&self.dataset, &self.questions) {
+            tracing::warn!("{warning}");
+        }
+    }
+
+    /// Adds the selected questions that are asked with the image of another frame, if that image belongs to this run or shard.
+    fn add_other_rooms(&mut self, mut questions: Vec<Question>) -> Result<()> {
+        questions.retain(|question| {
+            let shown = self.other_rooms.shown_for(&question.frame);
+            shown.is_some_and(|shown| self.places.contains_key(shown))
+        });
+        for question in &questions {
+            if self.digests.contains_key(&question.frame) {
+                continue;
+            }
+            let plan = self.config.plan.as_ref();
+            if let Some(digest) = plan.and_then(|plan| plan.digest(&question.frame)) {
+                self.digests.insert(question.frame.clone(), digest);
+                continue;
+            }
+            let source = Source::from_questions(&self.dataset, &question.frame)?;
+            if let Some(digest) = source.digest() {
+                self.digests.insert(source.name, digest);
+            }
+        }
+        self.with_other_rooms = questions;
+        Ok(())
+    }
+}
+
+/// Frames of the whole run, evenly spread, that a shard tries enhancers on. Frames that cannot be read are left out.
+fn probe_sources(dataset: &Dataset, selected: &[Question]) -> Vec<Source> {
+    let first = first_question_per_frame(selected);
+    evenly_spaced_indices(first.len(), FRAMES)
+        .into_iter()
+        .filter_map(|place| Source::from_questions(dataset, &first[place].frame).ok())
+        .collect()
+}
+
+/// Warns about the number of questions that `room-net` will guess, because no rule made them.
+fn warn_of_guesses(questions: &[Question], rules: &Rules) {
+    let unknown = questions
+        .iter()
+        .filter(|question| !is_in_rulebook(question, rules))
+        .count();
+    if unknown > 0 {
+        tracing::warn!(
+            "room-net guesses {unknown} of {} questions, because no rule made them",
+            questions.len()
+        );
+    }
+}
+
+/// Prints that photographs in the dark stay raw, if other images are enhanced.
+fn print_raw_photographs(job: &JobSettings, sources: &[Source], progress: &Progress) {
+    let are_enhanced = job
+        .enhancers
+        .on()
+        .intersection(TreatmentSet::DARK)
+        .is_some();
+    if !job.enhancers.is_empty() && !are_enhanced && !photographs::names(sources).is_empty() {
+        progress.print_on_terminal(
+            "the photographs in the dark are not enhanced; --llie-on noise,dark enhances them too",
+        );
+    }
+}
+
+/// Prints the training data of `room-net`, and of the enhancer `lift` if both are used.
+fn print_training(config: &Evaluation, progress: &Progress) {
+    let job = &config.job;
+    if !job.ask.shows_images_to(&ModelName::RoomNet) {
+        return;
+    }
+    let lift = if job
+        .enhancers
+        .llie
+        .iter()
+        .any(|word| word == Path::new("lift"))
+    {
+        "; lift was trained on such rooms in the dark"
+    } else {
+        ""
+    };
+    progress.print_on_terminal(&format!(
+        "room-net is a small network trained on well-lit drawn rooms: a demonstration, no vision-language model{lift}"
+    ));
+}
+
+/// Opens the data and selects the questions to ask. With a plan, the questions come from it, so that no frame is
+/// measured.
+fn selected_data(config: &Evaluation, progress: &Progress) -> Result<(Dataset, Vec<Question>)> {
+    let (place, set, selection) = (&config.place, &config.set, &config.selection);
+    let scene = &config.scene;
+    let dataset = match (&config.bank, &config.plan) {
+        (Some(bank), _) => bank.open_images(place, set, config.rule, progress)?,
+        (None, Some(_)) => open_without_generating(place, scene, set, selection, config.rule)?,
+        (None, None) => open_data(
+            place,
+            scene,
+            set,
+            selection,
+            &config.rules,
+            config.rule,
+            progress,
+        )?,
+    };
+    let Some(plan) = &config.plan else {
+        let questions = select(dataset.questions().to_vec(), selection)?;
+        return Ok((dataset, questions));
+    };
+    plan.check_identity(&plan_identity(config, &dataset)?)?;
+    let data_questions = match dataset.questions() {
+        [] => Vec::new(),
+        questions => select(questions.to_vec(), selection)?,
+    };
+    let questions = plan.questions(&dataset, &data_questions)?;
+    Ok((dataset, questions))
+}
+
+/// Position of each question among all questions of the data: from the plan if there is one, otherwise from the data set.
+fn file_places(
+    config: &Evaluation,
+    dataset: &Dataset,
+    selected: &[Question],
+) -> HashMap<QuestionId, usize> {
+    if let Some(plan) = &config.plan {
+        selected
+            .iter()
+            .map(|question| question.id.clone())
+            .zip(plan.question_places())
+            .collect()
+    } else {
+        dataset
+            .questions()
+            .iter()
+            .map(|question| question.id.clone())
+            .zip(0..)
+            .collect()
+    }
+}
+
+/// Digest of each source, over its file or all its files. Sources without frames are left out.
+fn digests(sources: &[Source]) -> HashMap<FrameId, Digest> {
+    sources
+        .iter()
+        .filter_map(|source| Some((source.name.clone(), source.digest()?)))
+        .collect()
+}
+
+/// Opens the models without sending any request.
+fn open_models(
+    config: &Evaluation,
+    controls: &AddedControls,
+    dataset: &Arc<Dataset>,
+    questions: &[Question],
+) -> Result<Vec<ModelUnderTest>> {
+    let ask = &config.job.ask;
+    let guesser = Random {
+        seed: config.job.light.kinds.sensor.seed,
+    };
+    let asks_observer = ask
+        .models
+        .iter()
+        .any(|model| matches!(model.id, ModelName::Observer(_)));
+    let observer = if asks_observer {
+        let rules = config.rules.clone();
+        Some(Observer::open(
+            dataset,
+            &config.place,
+            &config.set.root.data_root,
+            questions,
+            rules,
+        )?)
+    } else {
+        None
+    };
+    let runtime = config.job.loading.runtime.search();
+    models::open_all(ask, &controls.names, |name| {
+        Ok(match (name, &observer) {
+            (ModelName::Observer(control), Some(observer)) => {
+                Model::Local(observer.model(*control, guesser))
+            }
+            (ModelName::RoomNet, _) => {
+                warn_of_guesses(questions, &config.rules);
+                let net = RoomNet::new(runtime.clone(), config.rules.clone())?;
+                Model::Local(net.model(guesser))
+            }
+            _ => Model::Random(guesser),
+        })
+    })
+}

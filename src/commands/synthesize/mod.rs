@@ -1,0 +1,346 @@
+//! `synthesize`: writes low-light versions of images, identical to those that an evaluation of the same folder would send.
+
+mod check;
+mod sheet;
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use clap::{Args, Subcommand};
+use rayon::prelude::*;
+
+use crate::data::inputs::{InputFrame, Inputs, stem};
+use crate::data::{FolderArgs, Picture};
+use crate::engine::images::frame_work::FrameWork;
+use crate::engine::images::frames::{Frames, InputTally};
+use crate::engine::images::image_steps::ImageSteps;
+use crate::engine::images::progress::{Progress, StepBar};
+use crate::engine::images::recipes::{ImageRecipe, Recipe};
+use crate::engine::images::stored::{ImageCounts, ImageOutcome, OutputImage, Refusals, Sidecar};
+use crate::engine::images::timings::Timings;
+use crate::engine::images::workers::{ThreadArgs, pool};
+use crate::error::{Error, Result};
+use crate::runs::Outcome;
+use crate::runs::shard_args::{ShardArgs, keep_shard};
+use crate::types::text::counted;
+use crate::types::{Condition, Decides, Degradation, FrameId, Rgb, SetLight};
+use darkqa_light::{LightArgs, LightSettings, NoiseKey};
+
+pub(crate) use sheet::Sheet;
+use sheet::SheetRecipe;
+
+/// `synthesize`, or another form of it.
+#[derive(Debug, Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+pub(crate) struct SynthesizeCommand {
+    /// The form; `None` for images of all levels.
+    #[command(subcommand)]
+    form: Option<SynthesizeForm>,
+    /// Flags for images of all levels.
+    #[command(flatten)]
+    pub(crate) images: Option<SynthesizeArgs>,
+}
+
+/// The other forms of `synthesize`.
+#[derive(Debug, Subcommand)]
+enum SynthesizeForm {
+    /// Compare the images of a folder with the digests in their JSON files; nothing is made or changed
+    Check {
+        /// The folder of the images
+        #[arg(value_name = "DIR", add = Decides::Nothing)]
+        folder: PathBuf,
+    },
+    /// Make the image of a JSON file again, with the settings in it
+    From(ReplayArgs),
+}
+
+/// The flags of `synthesize from`.
+#[derive(Debug, Args)]
+struct ReplayArgs {
+    /// The JSON file of the image
+    #[arg(value_name = "FILE", add = Decides::Pixels)]
+    file: PathBuf,
+    /// The image that it was made from, or the folder of its frame
+    #[arg(value_name = "INPUT", add = Decides::Pixels)]
+    input: PathBuf,
+    /// Where the image goes, with its JSON file
+    #[arg(long, value_name = "DIR", add = Decides::Nothing)]
+    out: PathBuf,
+    /// Overwrite any file that has the name of the image
+    #[arg(long, add = Decides::Nothing)]
+    force: bool,
+    /// The reading of images.
+    #[command(flatten)]
+    folders: FolderArgs,
+}
+
+/// The flags of `synthesize`.
+#[derive(Debug, Args)]
+#[group(arg = "inputs")]
+pub(crate) struct SynthesizeArgs {
+    /// Images, folders of images, or folders of frames (frames.jsonl)
+    #[arg(required = true, value_name = "INPUT", add = Decides::Pixels)]
+    pub inputs: Vec<PathBuf>,
+    /// Where the images go, each with a JSON file of all settings that made it
+    #[arg(long, value_name = "DIR", add = Decides::Nothing)]
+    pub out: PathBuf,
+    /// The flags for the degradations.
+    #[command(flatten)]
+    pub light: LightArgs,
+    /// One figure per input instead; default: images
+    #[arg(long, value_enum, help_heading = "Synthesis", add = Decides::Nothing)]
+    pub sheet: Option<Sheet>,
+    /// Overwrite any file that has the name of an image
+    #[arg(long, help_heading = "Synthesis", add = Decides::Nothing)]
+    pub force: bool,
+    /// The reading of images.
+    #[command(flatten)]
+    pub folders: FolderArgs,
+    /// The part of the frames.
+    #[command(flatten)]
+    pub part: ShardArgs,
+    /// The number of threads.
+    #[command(flatten)]
+    pub threads: ThreadArgs,
+}
+
+/// The flags, and the light settings that they give.
+struct ImageMaking<'a> {
+    args: &'a SynthesizeArgs,
+    light: LightSettings,
+    /// Images that are not made because others are in their places.
+    refusals: Refusals,
+}
+
+/// Makes images, makes one again, or checks images.
+///
+/// # Errors
+/// If images cannot be made, or none to check is found.
+pub(crate) fn synthesize(command: &SynthesizeCommand, progress: &Progress) -> Result<Outcome> {
+    match (&command.form, &command.images) {
+        (Some(SynthesizeForm::Check { folder }), _) => check::check(folder),
+        (Some(SynthesizeForm::From(args)), _) => replay(args),
+        (None, Some(args)) => make_images(args, progress),
+        (None, None) => Err(Error::usage("INPUT", "an image or a folder is missing")),
+    }
+}
+
+/// Writes the images or figures of all inputs.
+///
+/// If one frame fails, the error is logged and counted, and the others continue. The reason of images that are refused is logged once.
+///
+/// # Errors
+/// If an input is missing, two frames have the same name, or the folder cannot be written to.
+fn make_images(args: &SynthesizeArgs, progress: &Progress) -> Result<Outcome> {
+    let out = &args.out;
+    let making = ImageMaking {
+        args,
+        light: LightSettings::resolve(&args.light, SetLight::Lit)?,
+        refusals: Refusals::default(),
+    };
+    making.light.refuse_matches("synthesize knows none")?;
+    let mut frames = Inputs::open(
+        &args.inputs,
+        &args.folders.root.data_root,
+        args.folders.decode.rule(),
+    )?;
+    keep_shard(&mut frames.entries, args.part.resolve()?)?;
+    let workers = pool(args.threads.threads)?;
+    fs::create_dir_all(out).map_err(|e| Error::file(out, "make", e))?;
+    let (files, tally) = (output_files(&making), InputTally::default());
+    let bar = progress.bar("images", frames.entries.len() * files.len());
+    let counts: Vec<ImageCounts> = workers.install(|| {
+        let entries = frames.entries.par_iter();
+        entries
+            .map(|entry| write_files(&making, &frames, entry, &files, &bar, &tally))
+            .collect()
+    });
+    drop(bar);
+    tally.warn();
+    making.refusals.log();
+    let total = counts
+        .iter()
+        .fold(ImageCounts::default(), |sum, counts| ImageCounts {
+            written: sum.written + counts.written,
+            unchanged: sum.unchanged + counts.unchanged,
+            failed: sum.failed + counts.failed,
+        });
+    Ok(outcome(total, out, frames.entries.len()))
+}
+
+/// The outcome of a command that made images of frames.
+fn outcome(counts: ImageCounts, out: &Path, frames: usize) -> Outcome {
+    Outcome::wrote(
+        out,
+        Outcome::complete_if(counts.failed == 0),
+        format!(
+            "{}: {} made of {}{}\n",
+            out.display(),
+            counts.written,
+            counted(frames, "frame"),
+            counts.not_written_text()
+        ),
+    )
+}
+
+/// Content of an output file of a frame: an image with a degradation (`None` for the untouched frame), or a figure.
+#[derive(Debug, Clone)]
+enum FrameFile {
+    Image(Option<Degradation>),
+    Sheet(Sheet),
+}
+
+/// The output files of each frame.
+fn output_files(making: &ImageMaking<'_>) -> Vec<FrameFile> {
+    if let Some(sheet) = making.args.sheet {
+        return vec![FrameFile::Sheet(sheet)];
+    }
+    making
+        .light
+        .degradations()
+        .into_iter()
+        .map(FrameFile::Image)
+        .collect()
+}
+
+/// Writes all files of one frame.
+fn write_files(
+    making: &ImageMaking<'_>,
+    frames: &Inputs,
+    entry: &InputFrame,
+    files: &[FrameFile],
+    bar: &StepBar,
+    tally: &InputTally,
+) -> ImageCounts {
+    let mut counts = ImageCounts::default();
+    let frames = OneFrame { frames, entry };
+    let recipe = Recipe::lossless(&making.light.kinds, &[]);
+    let timings = Timings::default();
+    let steps = ImageSteps {
+        frames: &frames,
+        recipe: &recipe,
+        limit: None,
+        timings: &timings,
+        stored: None,
+    };
+    let mut work = SynthesisWork {
+        making,
+        entry,
+        frame: FrameWork::for_frame(steps, entry.id.clone()),
+    };
+    match work.frame.note() {
+        Ok(note) => tally.add(&entry.id, &note),
+        Err(e) => {
+            tracing::error!("{e}");
+            counts.failed = files.len();
+            return counts;
+        }
+    }
+    // A problem of the input recurs for each of its images, but is logged once.
+    let mut logged = BTreeSet::new();
+    for file in files {
+        let outcome = match file {
+            FrameFile::Image(degradation) => work.image(degradation.as_ref()),
+            FrameFile::Sheet(sheet) => work.sheet(*sheet),
+        };
+        match outcome {
+            Ok(outcome) => {
+                if let Some(refusal) = counts.add(outcome) {
+                    making.refusals.add(refusal);
+                }
+            }
+            Err(e) => {
+                if logged.insert(e.to_string()) {
+                    tracing::error!("{e}");
+                }
+                counts.failed += 1;
+            }
+        }
+        bar.inc();
+    }
+    counts
+}
+
+/// A single frame of the inputs, because frames of different inputs may have the same name.
+struct OneFrame<'a> {
+    frames: &'a Inputs,
+    entry: &'a InputFrame,
+}
+
+impl Frames for OneFrame<'_> {
+    fn picture(&self, _: &FrameId) -> Result<Picture> {
+        self.frames.picture(self.entry)
+    }
+
+    fn focal(&self, _: &FrameId) -> Option<f64> {
+        self.frames.focal(self.entry)
+    }
+}
+
+/// The state of the work on one frame.
+struct SynthesisWork<'a> {
+    making: &'a ImageMaking<'a>,
+    entry: &'a InputFrame,
+    frame: FrameWork<'a>,
+}
+
+impl SynthesisWork<'_> {
+    fn image(&mut self, how: Option<&Degradation>) -> Result<ImageOutcome> {
+        let seed = self.making.light.kinds.sensor.seed;
+        let key = NoiseKey::new(seed, &self.entry.id);
+        let condition = Condition::raw(how.cloned());
+        let name = format!("{}_{condition}", self.entry.stem);
+        let applied = how.map(|how| self.frame.apply(how)).transpose()?;
+        let picture = self.frame.picture()?;
+        let recipe = ImageRecipe::new(
+            &self.entry.id,
+            picture.digest(),
+            picture.note(),
+            how,
+            applied.as_ref(),
+            &key,
+            seed,
+        );
+        let place = OutputImage::new(&self.making.args.out, &name, self.making.args.force);
+        place.write_unless_present(&recipe, || Ok(Rgb::clone(self.frame.degraded(how)?)))
+    }
+
+    fn sheet(&mut self, kind: Sheet) -> Result<ImageOutcome> {
+        let light = &self.making.light;
+        let recipe = SheetRecipe::new(kind, &self.entry.id, self.frame.picture()?, light)?;
+        let name = format!("{}_{kind}", self.entry.stem);
+        let place = OutputImage::new(&self.making.args.out, &name, self.making.args.force);
+        place.write_unless_present(&recipe, || kind.draw(&mut self.frame, light))
+    }
+}
+
+/// Makes the image of a JSON file again, with the settings in it.
+fn replay(args: &ReplayArgs) -> Result<Outcome> {
+    let input = std::slice::from_ref(&args.input);
+    let rule = args.folders.decode.rule();
+    let frames = Inputs::open(input, &args.folders.root.data_root, rule)?;
+    let file = &args.file;
+    let sidecar = Sidecar::<ImageRecipe>::read(file)?;
+    let [entry] = &frames.entries[..] else {
+        let problem = format_args!(
+            "one image expected, which FILE was made from; got {}",
+            frames.entries.len()
+        );
+        return Err(Error::usage("INPUT", problem));
+    };
+    let picture = frames.picture(entry)?;
+    let tally = InputTally::default();
+    tally.add(&entry.id, &picture.note());
+    tally.warn();
+    let degraded = ImageRecipe::replay(&sidecar, &picture, file)?;
+    let name = sidecar.recipe.name(&stem(&sidecar.recipe.frame())?);
+    fs::create_dir_all(&args.out).map_err(|e| Error::file(&args.out, "make", e))?;
+    let place = OutputImage::new(&args.out, &name, args.force);
+    let mut counts = ImageCounts::default();
+    if let Some(refusal) = counts.add(place.write_unless_present(&sidecar.recipe, || Ok(degraded))?)
+    {
+        return Err(refusal.into_error());
+    }
+    Ok(outcome(counts, &args.out, 1))
+}

@@ -1,0 +1,454 @@
+//! Frames of a video, decoded by the program `ffmpeg`: [`Video`].
+
+use std::ffi::OsString;
+use std::io::{BufReader, ErrorKind, Read};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdout, Command, Stdio};
+use std::sync::mpsc::{Receiver, channel};
+use std::thread::{self, JoinHandle};
+
+use super::Nanoseconds;
+use super::ffmpeg_colours::{FrameColours, needs_colours};
+use super::ffmpeg_log::{
+    FfmpegLog, FrameFacts, last_lines, parse_duration, read_log, supports_fps_mode,
+};
+use crate::error::{Error, Result};
+use crate::pictures::FrameConversion;
+use crate::pictures::decode_rule::MAX_PIXELS;
+use crate::types::Rgb;
+use crate::types::text::excerpt;
+
+/// Maximum length of an expression that selects frames, in bytes: a command line of Windows has at most 32,767 characters. Without the
+/// expression, all frames are decoded.
+const MAX_SELECT: usize = 30_000;
+
+/// Video file with metadata from ffmpeg.
+#[derive(Debug)]
+pub(crate) struct Video {
+    path: PathBuf,
+    /// Container format that ffmpeg has to assume; `None` to find it out.
+    format: Option<&'static str>,
+    /// Duration in seconds; `None` if unknown.
+    pub(crate) duration: Option<f64>,
+    /// Codec, size and rate of the first video stream.
+    pub(crate) stream: String,
+    /// Option of the installed version to output every frame once.
+    passthrough: [&'static str; 2],
+    /// True if the pictures are only for displays with Dolby Vision.
+    is_dolby_vision: bool,
+}
+
+/// Frame of a video.
+#[derive(Debug)]
+pub(crate) struct VideoFrame {
+    /// Time from the start of the video.
+    pub(crate) time: Nanoseconds,
+    /// Image in sRGB.
+    pub(crate) image: Rgb,
+}
+
+/// Conversion of the frames of a video to sRGB.
+#[derive(Debug)]
+struct Conversion {
+    rule: FrameConversion,
+    /// Number of pixels so far, and of those with light above white.
+    pixels: usize,
+    clipped: usize,
+}
+
+/// Running decoder of a video. Dropping it stops ffmpeg.
+#[derive(Debug)]
+pub(crate) struct VideoFrames {
+    path: PathBuf,
+    /// Codec of the video, as ffmpeg calls it.
+    codec: String,
+    /// Number of frames so far.
+    count: usize,
+    child: Child,
+    output: BufReader<ChildStdout>,
+    facts: Receiver<FrameFacts>,
+    log: Option<JoinHandle<FfmpegLog>>,
+    /// `None` if the codes are taken as sRGB codes.
+    conversion: Option<Conversion>,
+    /// Colours of the last frame.
+    colours: Option<FrameColours>,
+    /// The first frame, which was read to learn the colours.
+    first: Option<Result<Option<VideoFrame>>>,
+    /// The log after ffmpeg has ended.
+    ended_log: FfmpegLog,
+}
+
+impl Video {
+    /// Reads the metadata of a file with ffmpeg.
+    ///
+    /// # Errors
+    /// If ffmpeg is not on PATH, or finds no video in the file.
+    pub(crate) fn open(path: &Path) -> Result<Self> {
+        Self::open_as(path, None)
+    }
+
+    /// Reads the metadata of an MP4 file of a data set. A playlist in its place, which could name files elsewhere, is not read.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub(crate) fn open_mp4(path: &Path) -> Result<Self> {
+        Self::open_as(path, Some("mov"))
+    }
+
+    fn open_as(path: &Path, format: Option<&'static str>) -> Result<Self> {
+        crate::files::reading::refuse_pipes(path).map_err(|e| Error::file(path, "read", e))?;
+        let output = ffmpeg(path, format)
+            .stdin(Stdio::null())
+            .output()
+            .map_err(|e| start_error(&e))?;
+        let log = String::from_utf8_lossy(&output.stderr).into_owned();
+        let Some((_, stream)) = log.split_once(" Video: ") else {
+            let lines: Vec<String> = log.lines().map(str::to_owned).collect();
+            let problem = format!("ffmpeg finds no video in it: {}", last_lines(&lines));
+            return Err(Error::data(path.display(), problem));
+        };
+        let duration = log
+            .split_once("Duration: ")
+            .and_then(|(_, rest)| parse_duration(rest.split(',').next()?));
+        Ok(Self {
+            path: path.to_owned(),
+            format,
+            duration,
+            stream: stream.lines().next().unwrap_or_default().trim().to_owned(),
+            passthrough: if supports_fps_mode(&log) {
+                ["-fps_mode", "passthrough"]
+            } else {
+                ["-vsync", "passthrough"]
+            },
+            is_dolby_vision: log
+                .lines()
+                .any(|line| line.contains("DOVI") && line.contains("compatibility id: 0")),
+        })
+    }
+
+    /// Decodes one frame every `interval` seconds from the first one, or every frame if it is 0. Frames are converted to sRGB as the video
+    /// states its colours: codes of BT.709 and similar ones are kept, wide primaries and HDR are converted.
+    ///
+    /// # Errors
+    /// If ffmpeg cannot be started, or the colours of the video are not converted.
+    pub(crate) fn frames(&self, interval: f64) -> Result<VideoFrames> {
+        if interval == 0.0 {
+            return self.converted(None);
+        }
+        // The small addend is for frames at a multiple of the interval, whose quotient may be rounded down.
+        let [this, last] =
+            ["t", "prev_selected_t"].map(|time| format!("floor(({time}-start_t)/{interval}+1e-7)"));
+        self.converted(Some(&format!("isnan(prev_selected_t)+gt({this},{last})")))
+    }
+
+    /// Decodes at least the frames in these spans of time, each from its first second to its last, and converts them like [`Self::frames`].
+    ///
+    /// # Errors
+    /// As [`Self::frames`].
+    pub(crate) fn frames_within(&self, spans: &[[f64; 2]]) -> Result<VideoFrames> {
+        let spans: Vec<String> = spans
+            .iter()
+            .map(|[from, to]| format!("between(t,{from:.6},{to:.6})"))
+            .collect();
+        let select = spans.join("+");
+        self.converted(Some(&*select).filter(|select| select.len() <= MAX_SELECT))
+    }
+
+    /// Decodes the frames that an expression of ffmpeg's filter `select` selects, or all, and converts them to sRGB.
+    fn converted(&self, select: Option<&str>) -> Result<VideoFrames> {
+        let error = |problem: String| Error::data(self.path.display(), problem);
+        if self.is_dolby_vision {
+            let problem = "the pictures are only for displays with Dolby Vision; export the video for other displays (HDR10, HLG or SDR) first";
+            return Err(error(problem.to_owned()));
+        }
+        let mut frames = self.decode(select, None)?;
+        let first = frames.next();
+        let conversion = match &frames.colours {
+            Some(colours) => colours.conversion(&self.path).map_err(error)?,
+            None if needs_colours(&self.stream) && matches!(first, Ok(Some(_))) => {
+                let problem = "this ffmpeg does not state the colours of frames, which are not sRGB; version 4.3 or later expected";
+                return Err(error(problem.to_owned()));
+            }
+            None => None,
+        };
+        if let Some(conversion) = conversion {
+            drop(frames);
+            return self.decode(select, Some(conversion));
+        }
+        frames.first = Some(first);
+        Ok(frames)
+    }
+
+    /// Starts ffmpeg. Frames that are converted are decoded to 16 bits.
+    fn decode(
+        &self,
+        select: Option<&str>,
+        conversion: Option<FrameConversion>,
+    ) -> Result<VideoFrames> {
+        let filter = match select {
+            Some(select) => format!("select='{select}',showinfo"),
+            None => "showinfo".to_owned(),
+        };
+        let mut command = ffmpeg(&self.path, self.format);
+        command
+            .args(["-map", "0:v:0", "-vf", &filter])
+            .args(self.passthrough)
+            .args([
+                "-pix_fmt",
+                if conversion.is_some() {
+                    "rgb48be"
+                } else {
+                    "rgb24"
+                },
+            ])
+            .args(["-c:v", "ppm", "-f", "image2pipe", "-"])
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped());
+        let mut child = command.spawn().map_err(|e| start_error(&e))?;
+        let (Some(output), Some(log)) = (child.stdout.take(), child.stderr.take()) else {
+            return Err(start_error(&ErrorKind::BrokenPipe.into()));
+        };
+        let (sender, facts) = channel();
+        let log = thread::spawn(move || read_log(log, &sender));
+        let codec = self.stream.split([' ', ',']).next().unwrap_or_default();
+        Ok(VideoFrames {
+            path: self.path.clone(),
+            codec: codec.to_owned(),
+            count: 0,
+            child,
+            output: BufReader::with_capacity(1 << 20, output),
+            facts,
+            log: Some(log),
+            conversion: conversion.map(Conversion::new),
+            colours: None,
+            first: None,
+            ended_log: FfmpegLog::default(),
+        })
+    }
+}
+
+impl Conversion {
+    fn new(conversion: FrameConversion) -> Self {
+        Self {
+            rule: conversion,
+            pixels: 0,
+            clipped: 0,
+        }
+    }
+
+    fn convert(&mut self, samples: &[u16]) -> Vec<u8> {
+        let (converted, clipped) = self.rule.convert(samples);
+        self.pixels += samples.len() / 3;
+        self.clipped += clipped;
+        converted
+    }
+}
+
+/// ffmpeg with a file as input. It may only open files, so a playlist in an untrusted file cannot lead to a server.
+fn ffmpeg(path: &Path, format: Option<&str>) -> Command {
+    let mut input = OsString::from("file:");
+    input.push(path);
+    let mut command = Command::new("ffmpeg");
+    command
+        .args(["-nostdin", "-nostats", "-protocol_whitelist", "file,pipe"])
+        .args(format.iter().flat_map(|format| ["-f", format]))
+        .arg("-i")
+        .arg(input);
+    command
+}
+
+/// Error if ffmpeg cannot be started.
+fn start_error(problem: &std::io::Error) -> Error {
+    let remedy = if problem.kind() == ErrorKind::NotFound {
+        "not found on PATH; videos are decoded by it: install it (apt install ffmpeg, brew install ffmpeg), or give the folder of extracted images to --data".to_owned()
+    } else {
+        format!("cannot be started: {problem}")
+    };
+    Error::usage("ffmpeg", remedy)
+}
+
+impl VideoFrames {
+    /// Reads the next frame; `None` at the end.
+    ///
+    /// # Errors
+    /// If ffmpeg fails, its output is not an image, or the colours change.
+    pub(crate) fn next(&mut self) -> Result<Option<VideoFrame>> {
+        if let Some(first) = self.first.take() {
+            return first;
+        }
+        match self.read_image() {
+            Ok(Some(image)) => {
+                let facts = self
+                    .facts
+                    .recv()
+                    .map_err(|_| self.failure("it states no time of a frame"))?;
+                self.check_colours(&facts)?;
+                self.colours = facts.colours;
+                self.count += 1;
+                let time = facts.time;
+                Ok(Some(VideoFrame { time, image }))
+            }
+            Ok(None) => {
+                let status = self.child.wait();
+                // Without a decoder, some versions end without an error.
+                if self.count == 0 && self.ended_log().lacks_decoder {
+                    return Err(self.no_decoder());
+                }
+                if status.is_ok_and(|status| status.success()) {
+                    return Ok(None);
+                }
+                Err(self.failure("it ends with an error"))
+            }
+            Err(problem) => Err(self.failure(&problem)),
+        }
+    }
+
+    /// Checks that a frame needs the same conversion as the frames before it.
+    fn check_colours(&mut self, facts: &FrameFacts) -> Result<()> {
+        let (Some(before), Some(found)) = (&self.colours, &facts.colours) else {
+            return Ok(());
+        };
+        if before == found {
+            return Ok(());
+        }
+        let name = |conversion: Option<&FrameConversion>| {
+            conversion
+                .map_or("sRGB codes", FrameConversion::name)
+                .to_owned()
+        };
+        let expected = name(self.conversion.as_ref().map(|known| &known.rule));
+        let found = match found.conversion(&self.path) {
+            Ok(conversion) => name(conversion.as_ref()),
+            Err(problem) => problem,
+        };
+        if found == expected {
+            return Ok(());
+        }
+        let at = super::seconds(facts.time);
+        let problem = format!("the colours change at {at:.3} s: {expected}, then {found}");
+        Err(self.failure(&problem))
+    }
+
+    /// Name of the colours that are converted to sRGB; `None` if the codes are taken as sRGB codes.
+    pub(crate) fn converted_from(&self) -> Option<&str> {
+        self.conversion.as_ref().map(|found| found.rule.name())
+    }
+
+    /// Share of the pixels so far whose light is above white and was clipped; `None` if the video is not HDR.
+    pub(crate) fn clipped_share(&self) -> Option<f64> {
+        let found = self.conversion.as_ref()?;
+        found
+            .rule
+            .is_hdr()
+            .then(|| found.clipped as f64 / found.pixels.max(1) as f64)
+    }
+
+    /// Reads the next image, in the format PPM.
+    fn read_image(&mut self) -> Result<Option<Rgb>, String> {
+        let Some(magic) = self.read_word()? else {
+            return Ok(None);
+        };
+        let (width, height, max_value) = (
+            self.read_number()?,
+            self.read_number()?,
+            self.read_number()?,
+        );
+        let expected = if self.conversion.is_some() {
+            65_535
+        } else {
+            255
+        };
+        let pixels = width.saturating_mul(height);
+        if magic != "P6" || max_value != expected || pixels == 0 || pixels as u64 > MAX_PIXELS {
+            return Err(format!("an image {magic} of {width} × {height} pixels"));
+        }
+        let samples = if let Some(conversion) = &mut self.conversion {
+            let mut bytes = vec![0; pixels * 6];
+            self.output
+                .read_exact(&mut bytes)
+                .map_err(|e| e.to_string())?;
+            let pairs = bytes.as_chunks::<2>().0.iter();
+            let samples: Vec<u16> = pairs.map(|pair| u16::from_be_bytes(*pair)).collect();
+            conversion.convert(&samples)
+        } else {
+            let mut samples = vec![0; pixels * 3];
+            self.output
+                .read_exact(&mut samples)
+                .map_err(|e| e.to_string())?;
+            samples
+        };
+        Rgb::new(height, width, samples)
+            .map(Some)
+            .map_err(|e| e.to_string())
+    }
+
+    /// Reads a number in the head of an image.
+    fn read_number(&mut self) -> Result<usize, String> {
+        let word = self.read_word()?.unwrap_or_default();
+        word.parse::<usize>()
+            .map_err(|_| format!("{word:?} in the head of an image"))
+    }
+
+    /// Reads the next word of the header of an image and the space after it; `None` at the end.
+    fn read_word(&mut self) -> Result<Option<String>, String> {
+        let mut word = String::new();
+        loop {
+            let mut byte = [0];
+            match self.output.read(&mut byte) {
+                Ok(0) => return Ok((!word.is_empty()).then_some(word)),
+                Ok(_) if byte[0].is_ascii_whitespace() => return Ok(Some(word)),
+                Ok(_) if word.len() < 20 => word.push(char::from(byte[0])),
+                Ok(_) => return Err(format!("{word:?} in place of an image")),
+                Err(e) if e.kind() == ErrorKind::Interrupted => {}
+                Err(e) => return Err(e.to_string()),
+            }
+        }
+    }
+
+    /// Message about damage that ffmpeg reported while it decoded the video to the end; `None` if it reported none.
+    pub(crate) fn damage(mut self) -> Option<String> {
+        let log = self.ended_log();
+        let first = log.first_damage.as_ref()?;
+        let count = match log.damage_lines {
+            1 => "a problem".to_owned(),
+            count => format!("{count} problems, first"),
+        };
+        Some(format!("ffmpeg reports {count}: {}", excerpt(first, 150)))
+    }
+
+    /// Stops ffmpeg, and returns the error with its last lines.
+    fn failure(&mut self, problem: &str) -> Error {
+        // These fail only if ffmpeg has already ended.
+        drop(self.child.kill());
+        drop(self.child.wait());
+        let log = self.ended_log();
+        let problem = format!("ffmpeg: {problem}; {}", last_lines(&log.last));
+        Error::data(self.path.display(), problem)
+    }
+
+    /// The log of ffmpeg, which has ended.
+    fn ended_log(&mut self) -> &FfmpegLog {
+        if let Some(log) = self.log.take() {
+            self.ended_log = log.join().unwrap_or_default();
+        }
+        &self.ended_log
+    }
+
+    /// The error if the installed ffmpeg has no decoder for the codec.
+    fn no_decoder(&self) -> Error {
+        let problem = format_args!(
+            "the installed one has no decoder for {}, the codec of {}; install one that has (for av1 with libdav1d): apt install ffmpeg (Debian 11, Ubuntu 22.04 or later), brew install ffmpeg, or conda install -c conda-forge ffmpeg",
+            self.codec,
+            self.path.display()
+        );
+        Error::usage("ffmpeg", problem)
+    }
+}
+
+impl Drop for VideoFrames {
+    fn drop(&mut self) {
+        drop(self.child.kill());
+        drop(self.child.wait());
+    }
+}

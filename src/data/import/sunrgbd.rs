@@ -1,0 +1,273 @@
+//! SUN RGB-D as it is distributed: `<sensor>/…/<frame>/image/*.jpg`, `depth_bfx/*.png` or `depth/*.png`, `intrinsics.txt`,
+//! `scene.txt` and `annotation2Dfinal/index.json`.
+//!
+//! Depth is in millimetres, rotated left by three bits (`read3dPoints.m` of its toolbox), and clamped at 8 m. Classes and segments come
+//! from the polygons that annotators drew around objects; each object is a segment. If polygons overlap, the smaller one is in front.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use ndarray::Array2;
+use serde::Deserialize;
+use serde_json::Value;
+
+use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing};
+use super::files::{IMAGES, check_same_size, file_name, files, folders, read_numbers, read_png};
+use super::polygons::{Polygon, draw};
+use crate::error::{Error, Result};
+use crate::files::reading::{json, text};
+use crate::labels::canonical;
+use crate::labels::names::class_of;
+use crate::pictures::raw_png::SampleForm;
+use crate::types::{Intrinsics, Label, Labels, Rgb};
+
+/// Depth folders, in order of preference. `depth_bfx` is `depth` with its holes filled, which the toolbox reads (`depthpath` of its
+/// `SUNRGBDMeta`).
+const DEPTHS: [&str; 2] = ["depth_bfx", "depth"];
+
+/// Maximum depth in millimetres; the toolbox clamps at the same value.
+const MAX_DEPTH: u32 = 8_000;
+
+/// Folder of SUN RGB-D frames.
+#[derive(Debug)]
+pub(super) struct SunRgbd {
+    listing: Listing,
+    files: Vec<SunRgbdFiles>,
+    /// Number of each object name.
+    numbers: BTreeMap<String, u16>,
+    /// Files of cameras and room types.
+    frame_files: Vec<PathBuf>,
+}
+
+#[derive(Debug)]
+struct SunRgbdFiles {
+    /// Name of the depth folder, and the depth file.
+    depth: Option<(&'static str, PathBuf)>,
+    annotation: PathBuf,
+}
+
+/// Used fields of `index.json`.
+#[derive(Deserialize)]
+struct Index {
+    frames: Vec<SunRgbdFrame>,
+    objects: Vec<Option<SunRgbdObject>>,
+}
+
+#[derive(Deserialize)]
+struct SunRgbdFrame {
+    #[serde(default)]
+    polygon: Vec<Shape>,
+}
+
+#[derive(Deserialize)]
+struct Shape {
+    x: Value,
+    y: Value,
+    object: usize,
+}
+
+#[derive(Deserialize)]
+struct SunRgbdObject {
+    name: String,
+}
+
+impl SunRgbd {
+    pub(super) fn open(folder: &Path) -> Result<Self> {
+        let mut set = Self {
+            listing: Listing::default(),
+            files: Vec::new(),
+            numbers: BTreeMap::new(),
+            frame_files: Vec::new(),
+        };
+        set.find_frames(folder, &[])?;
+        set.number_names()?;
+        set.listing
+            .frames
+            .sort_by(|a, b| (&a.scene, &a.frame).cmp(&(&b.scene, &b.frame)));
+        Ok(set)
+    }
+
+    /// Finds the frames in a folder and its subfolders; `parents` are the names of the folders from the root to it.
+    fn find_frames(&mut self, folder: &Path, parents: &[String]) -> Result<()> {
+        let annotation = folder.join("annotation2Dfinal").join("index.json");
+        if folder.join("image").is_dir() && annotation.is_file() {
+            return self.add_frame(folder, parents, annotation);
+        }
+        for inner in folders(folder)? {
+            let name = file_name(&inner);
+            self.find_frames(&inner, &[parents, &[name]].concat())?;
+        }
+        Ok(())
+    }
+
+    fn add_frame(&mut self, folder: &Path, parents: &[String], annotation: PathBuf) -> Result<()> {
+        let Some(rgb) = files(&folder.join("image"), &IMAGES)?.into_values().next() else {
+            return Err(Error::data(
+                folder.join("image").display(),
+                "no image in this folder",
+            ));
+        };
+        let mut depth = None;
+        for name in DEPTHS {
+            let first = files(&folder.join(name), &[".png"])?.into_values().next();
+            depth = depth.or(first.map(|path| (name, path)));
+        }
+        let camera = folder.join("intrinsics.txt");
+        let intrinsics = if camera.exists() {
+            match read_numbers(&camera)?[..] {
+                [fx, _, cx, _, fy, cy, ..] => Some(Intrinsics { fx, fy, cx, cy }),
+                _ => return Err(Error::data(camera.display(), "nine numbers expected")),
+            }
+        } else {
+            None
+        };
+        let room_file = folder.join("scene.txt");
+        let room = room_file.exists().then(|| text(&room_file)).transpose()?;
+        self.frame_files.extend([camera, room_file]);
+        let (frame, scene) = parents.split_last().map_or_else(
+            || ("frame".to_owned(), String::new()),
+            |(frame, scene)| (frame.clone(), scene.join("-")),
+        );
+        self.files.push(SunRgbdFiles { depth, annotation });
+        self.listing.frames.push(ListedFrame {
+            scene: if scene.is_empty() {
+                "sunrgbd".to_owned()
+            } else {
+                scene
+            },
+            frame,
+            time: None,
+            pose: None,
+            intrinsics,
+            room: room.map(|room| room.trim().to_lowercase().replace('_', " ")),
+            rgb,
+            index: self.files.len() - 1,
+        });
+        Ok(())
+    }
+
+    /// Numbers all object names of the data set alphabetically, so that the numbers do not depend on the order of files.
+    fn number_names(&mut self) -> Result<()> {
+        let mut counts = BTreeMap::new();
+        for files in &self.files {
+            for object in json::<Index>(&files.annotation)?
+                .objects
+                .into_iter()
+                .flatten()
+            {
+                *counts
+                    .entry(normalize_name(&object.name))
+                    .or_insert(0_usize) += 1;
+            }
+        }
+        let mut labels = Labels {
+            space: "sunrgbd".into(),
+            void: [0].into(),
+            ..Labels::default()
+        };
+        for (number, (name, count)) in (1..=u16::MAX).zip(counts) {
+            let Some(class) = class_of(&name, &name, count, &mut self.listing.unlisted) else {
+                continue;
+            };
+            let label = Label {
+                name: name.clone(),
+                canonical: class.to_owned(),
+            };
+            labels.labels.insert(number, label);
+            self.numbers.insert(name, number);
+        }
+        // Annotators used free text, so every class is expressible.
+        labels.expressible = canonical().into_iter().collect::<BTreeSet<String>>();
+        self.listing.labels = labels;
+        Ok(())
+    }
+}
+
+/// Name of an object in lower case, without the suffix that annotators added to distinguish objects: `chair:1`, `chair 2`.
+fn normalize_name(name: &str) -> String {
+    let name = name.split(':').next().unwrap_or_default().trim();
+    name.trim_end_matches(|letter: char| letter.is_ascii_digit() || letter == '_')
+        .trim()
+        .to_lowercase()
+}
+
+/// Numbers in a JSON array, or a single number, because the files contain both.
+fn number_list(value: &Value) -> Vec<f64> {
+    match value {
+        Value::Array(list) => list
+            .iter()
+            .map(|number| number.as_f64().unwrap_or(f64::NAN))
+            .collect(),
+        single => single.as_f64().into_iter().collect(),
+    }
+}
+
+impl Adapter for SunRgbd {
+    fn listing(&self) -> &Listing {
+        &self.listing
+    }
+
+    fn depth_folder(&self, frame: &ListedFrame) -> Option<&'static str> {
+        let (folder, _) = self.files[frame.index].depth.as_ref()?;
+        Some(folder)
+    }
+
+    fn other_files(&self) -> Vec<PathBuf> {
+        self.files
+            .iter()
+            .flat_map(|files| {
+                files
+                    .depth
+                    .iter()
+                    .map(|(_, path)| path)
+                    .chain([&files.annotation])
+            })
+            .chain(&self.frame_files)
+            .cloned()
+            .collect()
+    }
+
+    fn read_maps(&self, frame: &ListedFrame, rgb: &Rgb) -> Result<FrameMaps> {
+        let files = &self.files[frame.index];
+        let depth = match &files.depth {
+            Some((_, path)) => {
+                let rotated = read_png(path, &[SampleForm::Grey16])?;
+                check_same_size(path, &rotated, rgb)?;
+                Some(rotated.mapv(|value| u32::from(value.rotate_right(3)).min(MAX_DEPTH)))
+            }
+            None => None,
+        };
+        let index: Index = json(&files.annotation)?;
+        let shapes = index
+            .frames
+            .into_iter()
+            .next()
+            .map_or_else(Vec::new, |view| view.polygon);
+        let polygons: Vec<Polygon<(u16, u32)>> = shapes
+            .into_iter()
+            .filter_map(|shape| {
+                let name = &index.objects.get(shape.object)?.as_ref()?.name;
+                let number = self
+                    .numbers
+                    .get(&normalize_name(name))
+                    .copied()
+                    .unwrap_or(0);
+                let corners = number_list(&shape.x)
+                    .into_iter()
+                    .zip(number_list(&shape.y))
+                    .collect();
+                Some(Polygon {
+                    corners,
+                    value: (number, shape.object as u32 + 1),
+                })
+            })
+            .collect();
+        let map: Array2<(u16, u32)> = draw(&polygons, [rgb.width(), rgb.height()]);
+        Ok(FrameMaps {
+            depth,
+            semantic: Some(map.mapv(|(number, _)| number)),
+            segments: Some(map.mapv(|(_, object)| object)),
+            room: None,
+        })
+    }
+}

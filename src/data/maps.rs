@@ -1,0 +1,361 @@
+//! Depth, semantic and segment maps of an image: [`MapPaths`], [`MapFiles`].
+//!
+//! A map has one number for each pixel of its image. A map of another size is refused instead of scaled, because ids cannot be
+//! interpolated.
+
+use std::path::{Path, PathBuf};
+
+use ndarray::Array2;
+
+use crate::error::{Error, Result};
+use crate::files::reading;
+use crate::pictures::ImageFile;
+use crate::pictures::decode_rule::MAX_PIXELS;
+use crate::pictures::image_file::StatedOrientation;
+use crate::pictures::npy::Npy;
+use crate::pictures::raw_png::{RawPng, SampleForm};
+use crate::types::Digest;
+
+/// Maximum depth of a pixel, in millimetres: a kilometre, deeper than any room (chosen). A larger value means a wrong unit, such as
+/// millimetres read as metres.
+const MAX_DEPTH_MM: f64 = 1e6;
+
+/// Paths of the maps that a frame has.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct MapPaths {
+    pub(crate) depth: Option<DepthFile>,
+    /// Class of each pixel: a PNG file of 8-bit grey, 16-bit grey or palette indices.
+    pub(crate) semantic: Option<PathBuf>,
+    /// Segment of each pixel, 0 for none: a 16-bit grey PNG file, or a `.npy` file of integers.
+    pub(crate) segments: Option<PathBuf>,
+}
+
+/// File of a depth map.
+#[derive(Debug, Clone)]
+pub(crate) enum DepthFile {
+    /// 16-bit grey PNG file; 0 means no depth.
+    Png {
+        path: PathBuf,
+        /// Metres per unit of the samples.
+        scale: f64,
+    },
+    /// `.npy` file of metres as 2-, 4- or 8-byte floats. NaN, infinity, 0 and negative numbers mean no depth.
+    Npy(PathBuf),
+}
+
+impl DepthFile {
+    /// The depth file at `path`; `scale` is the `depth_scale` of the frame.
+    pub(crate) fn new(path: PathBuf, scale: Option<f64>) -> Result<Self, String> {
+        match (is_npy(&path), scale) {
+            (true, None | Some(1.0)) => Ok(Self::Npy(path)),
+            (true, Some(scale)) => Err(format!(
+                "depth_scale is {scale}, but a .npy file of depth is in metres; leave it out"
+            )),
+            (false, Some(scale)) if scale.is_finite() && scale > 0.0 => {
+                Ok(Self::Png { path, scale })
+            }
+            (false, Some(scale)) => Err(format!(
+                "depth_scale is {scale}; the metres in one unit of the depth PNG expected, as 0.001"
+            )),
+            (false, None) => Err(
+                "depth_scale is missing: the metres in one unit of the depth PNG, as 0.001"
+                    .to_owned(),
+            ),
+        }
+    }
+
+    fn path(&self) -> &Path {
+        match self {
+            Self::Png { path, .. } | Self::Npy(path) => path,
+        }
+    }
+
+    /// Decodes the depth in millimetres, whatever the size of the map.
+    pub(crate) fn decode_any_size(&self, bytes: &[u8]) -> Result<Array2<u32>, String> {
+        let size = match self {
+            Self::Png { .. } => RawPng::open(bytes, &[SampleForm::Grey16], MAX_PIXELS)?.size,
+            Self::Npy(_) => Npy::parse(bytes)?.size,
+        };
+        self.decode(bytes, size)
+    }
+
+    /// Decodes the depth in millimetres of a map that must have this size.
+    fn decode(&self, bytes: &[u8], size: Size) -> Result<Array2<u32>, String> {
+        match self {
+            Self::Png { scale, .. } => {
+                // Convert the scale first: most scales are a whole number of millimetres, so the product is exact.
+                let unit = scale * 1_000.0;
+                let table: Vec<u32> = (0..=u16::MAX)
+                    .map(|units| millimetres(units.into(), unit).unwrap_or(u32::MAX))
+                    .collect();
+                let depths = png(bytes, &[SampleForm::Grey16], size, |units| {
+                    table[usize::from(units)]
+                })?;
+                if let Some(at) = depths.iter().position(|depth| *depth == u32::MAX) {
+                    let units = png(bytes, &[SampleForm::Grey16], size, |units| units)?[at];
+                    millimetres(units.into(), unit)?;
+                }
+                Array2::from_shape_vec(size, depths).map_err(|e| e.to_string())
+            }
+            Self::Npy(_) => {
+                let metres = npy(bytes, size)?.floats()?;
+                collect_grid(size, metres.map(|metres| millimetres(metres, 1_000.0)))
+            }
+        }
+    }
+}
+
+impl MapPaths {
+    /// Paths of all map files.
+    pub(crate) fn paths(&self) -> impl Iterator<Item = PathBuf> {
+        self.depth
+            .iter()
+            .map(|depth| depth.path().to_owned())
+            .chain(
+                [&self.semantic, &self.segments]
+                    .into_iter()
+                    .flatten()
+                    .cloned(),
+            )
+    }
+
+    /// A frame without maps.
+    pub(crate) const NONE: Self = Self {
+        depth: None,
+        semantic: None,
+        segments: None,
+    };
+
+    /// True if the frame has no maps.
+    pub(super) fn is_empty(&self) -> bool {
+        self.depth.is_none() && self.semantic.is_none() && self.segments.is_none()
+    }
+
+    /// Path and size (height, width) of each map, from its header.
+    ///
+    /// # Errors
+    /// If a file cannot be read or is not a map; the error names it.
+    pub(super) fn sizes(&self) -> Result<Vec<(&Path, Size)>> {
+        let depth = self.depth.as_ref().map(DepthFile::path);
+        let files = [depth, self.semantic.as_deref(), self.segments.as_deref()];
+        files
+            .into_iter()
+            .flatten()
+            .map(|path| {
+                let bytes = reading::bytes(path)?;
+                let size = if is_npy(path) {
+                    Npy::parse(&bytes).map(|npy| npy.size)
+                } else {
+                    RawPng::open(&bytes, &SampleForm::ALL, MAX_PIXELS)
+                        .map(|png| png.size)
+                        .map_err(String::from)
+                };
+                Ok((path, with_path(path, size)?))
+            })
+            .collect()
+    }
+
+    /// Turns off the EXIF rotation of the image if it has maps: maps are not rotated, so they must have the size of the image as stored.
+    ///
+    /// # Errors
+    /// If the file states a rotation and a map has another size than the image as stored.
+    pub(super) fn match_orientation(&self, image: ImageFile) -> Result<ImageFile> {
+        if self.is_empty() {
+            return Ok(image);
+        }
+        let Some(StatedOrientation {
+            orientation,
+            stored_size,
+        }) = image.stated_orientation()
+        else {
+            return Ok(image);
+        };
+        for (path, size) in self.sizes()? {
+            if size != stored_size {
+                let problem = format_args!(
+                    "{} × {} pixels (height × width), but its image {} is stored with {} × {} and turned by its EXIF orientation {orientation}; maps must have the size of the image as stored, which is then not turned, or the file no orientation",
+                    size.0,
+                    size.1,
+                    image.place(),
+                    stored_size.0,
+                    stored_size.1,
+                );
+                return Err(Error::data(path.display(), problem));
+            }
+        }
+        Ok(image.ignoring_orientation())
+    }
+
+    /// Reads the map files without decoding them.
+    ///
+    /// # Errors
+    /// If a file cannot be read; the error names it.
+    pub(crate) fn read(&self) -> Result<MapFiles<'_>> {
+        Ok(MapFiles {
+            maps: self,
+            depth: optional_bytes(self.depth.as_ref().map(DepthFile::path))?,
+            semantic: optional_bytes(self.semantic.as_deref())?,
+            segments: optional_bytes(self.segments.as_deref())?,
+        })
+    }
+}
+
+fn optional_bytes(path: Option<&Path>) -> Result<Option<Vec<u8>>> {
+    path.map(reading::bytes).transpose()
+}
+
+/// Bytes of a frame's map files.
+#[derive(Debug)]
+pub(crate) struct MapFiles<'a> {
+    maps: &'a MapPaths,
+    depth: Option<Vec<u8>>,
+    semantic: Option<Vec<u8>>,
+    segments: Option<Vec<u8>>,
+}
+
+impl MapFiles<'_> {
+    /// Digest of the files and of the unit of depth.
+    pub(crate) fn digest(&self) -> Digest {
+        let unit = match &self.maps.depth {
+            Some(DepthFile::Png { scale, .. }) => scale.to_string(),
+            Some(DepthFile::Npy(_)) => "m".to_owned(),
+            None => String::new(),
+        };
+        let files = [&self.depth, &self.semantic, &self.segments].map(|file| {
+            file.as_deref().map_or_else(Vec::new, |bytes| {
+                Digest::from_bytes(bytes).as_bytes().to_vec()
+            })
+        });
+        Digest::from_parts(
+            [unit.as_bytes()]
+                .into_iter()
+                .chain(files.iter().map(Vec::as_slice)),
+        )
+    }
+
+    /// Decodes the depth of each pixel, in millimetres; `None` without a depth map.
+    ///
+    /// # Errors
+    /// If the file has another format, another size than the image, or an impossible value; the error names it.
+    pub(crate) fn depth(&self, size: Size) -> Result<Option<Array2<u32>>> {
+        let Some((file, bytes)) = self.maps.depth.as_ref().zip(self.depth.as_ref()) else {
+            return Ok(None);
+        };
+        with_path(file.path(), file.decode(bytes, size)).map(Some)
+    }
+
+    /// Decodes the class of each pixel; `None` without a semantic map.
+    ///
+    /// # Errors
+    /// As [`Self::depth`].
+    pub(crate) fn semantic(&self, size: Size) -> Result<Option<Array2<u16>>> {
+        let Some((path, bytes)) = self.maps.semantic.as_ref().zip(self.semantic.as_ref()) else {
+            return Ok(None);
+        };
+        with_path(path, semantic(bytes, size)).map(Some)
+    }
+
+    /// Decodes the segment of each pixel; `None` without a segment map.
+    ///
+    /// # Errors
+    /// As [`Self::depth`].
+    pub(crate) fn segments(&self, size: Size) -> Result<Option<Array2<u32>>> {
+        let Some((path, bytes)) = self.maps.segments.as_ref().zip(self.segments.as_ref()) else {
+            return Ok(None);
+        };
+        with_path(path, segments(bytes, size, is_npy(path))).map(Some)
+    }
+}
+
+/// Height and width in pixels.
+pub(super) type Size = (usize, usize);
+
+fn semantic(bytes: &[u8], size: Size) -> Result<Array2<u16>, String> {
+    let ids = png(bytes, &SampleForm::ALL, size, |id| id)?;
+    Array2::from_shape_vec(size, ids).map_err(|e| e.to_string())
+}
+
+fn segments(bytes: &[u8], size: Size, is_npy: bool) -> Result<Array2<u32>, String> {
+    if is_npy {
+        return collect_grid(size, npy(bytes, size)?.integers()?.map(segment_id));
+    }
+    // 8-bit files are refused: they have room for 255 segments, and larger ids are lost silently when they are written.
+    let ids = png(bytes, &[SampleForm::Grey16], size, u32::from)?;
+    Array2::from_shape_vec(size, ids).map_err(|e| e.to_string())
+}
+
+/// Checks the range of a segment id.
+fn segment_id(id: i128) -> Result<u32, String> {
+    u32::try_from(id).map_err(|_| {
+        format!(
+            "{id} is not the id of a segment; 0 (none) to {} expected",
+            u32::MAX
+        )
+    })
+}
+
+/// Converts a depth to whole millimetres, rounded half to even; 0 if there is no depth. `unit` is millimetres per unit.
+pub(crate) fn millimetres(units: f64, unit: f64) -> Result<u32, String> {
+    if !units.is_finite() || units <= 0.0 {
+        return Ok(0);
+    }
+    let depth = units * unit;
+    if depth > MAX_DEPTH_MM {
+        return Err(format!(
+            "a depth of {} m, deeper than any room ({} m at most); a .npy file is in metres and a PNG in units of its depth_scale, with 0 where there is no depth",
+            depth / 1_000.0,
+            MAX_DEPTH_MM / 1_000.0
+        ));
+    }
+    Ok(depth.round_ties_even() as u32)
+}
+
+fn is_npy(path: &Path) -> bool {
+    path.extension()
+        .is_some_and(|ending| ending.eq_ignore_ascii_case("npy"))
+}
+
+/// Adds the path of the file to the error.
+fn with_path<T>(path: &Path, read: Result<T, String>) -> Result<T> {
+    read.map_err(|problem| Error::data(path.display(), problem))
+}
+
+/// Decodes a PNG map of this size and converts each sample.
+fn png<T: Clone>(
+    bytes: &[u8],
+    forms: &[SampleForm],
+    size: Size,
+    convert: impl Fn(u16) -> T,
+) -> Result<Vec<T>, String> {
+    let png = RawPng::open(bytes, forms, MAX_PIXELS)?;
+    check_size(png.size, size)?;
+    png.samples(convert)
+}
+
+/// Parses a `.npy` map of this size.
+fn npy(bytes: &[u8], size: Size) -> Result<Npy<'_>, String> {
+    let npy = Npy::parse(bytes)?;
+    check_size(npy.size, size)?;
+    Ok(npy)
+}
+
+fn check_size(map: Size, image: Size) -> Result<(), String> {
+    if map == image {
+        return Ok(());
+    }
+    Err(format!(
+        "{} × {} pixels (height × width), but its image has {} × {}; a map must have the size of its image",
+        map.0, map.1, image.0, image.1
+    ))
+}
+
+fn collect_grid<T>(
+    size: Size,
+    values: impl Iterator<Item = Result<T, String>>,
+) -> Result<Array2<T>, String> {
+    let values = values.collect::<Result<Vec<T>, String>>()?;
+    Array2::from_shape_vec(size, values).map_err(|e| e.to_string())
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,232 @@
+//! Choice of the answer column among several candidates: [`option_column`], [`yes_or_no_column`].
+//!
+//! Columns are compared in the rows where both have a valid answer, so a gap or a broken answer in a column does not exclude it.
+
+use super::column::Column;
+use super::map::map_flag;
+use super::names::Role;
+use super::roles::Roles;
+use crate::data::ready_made::cells::Table;
+use crate::data::ready_made::choices::{AnswerFormat, OptionList, digit_index, yes_no_index};
+use crate::data::ready_made::items::{AnswerCell, Item};
+use crate::types::text::excerpt;
+
+/// Index of the choice that each row of a column identifies; `None` for a row without a valid answer.
+type RowChoices = Vec<Option<usize>>;
+
+/// Column that may have the answers.
+struct Candidate<'a> {
+    column: &'a Column,
+    /// Choices of the rows in each format that fits, at least one.
+    interpretations: Vec<RowChoices>,
+}
+
+/// Answer of a row in a column; `None` if it has none or several.
+fn answer(table: &Table, item: &Item, column: &Column) -> Option<String> {
+    match AnswerCell::from_row(&table.rows[item.row], column) {
+        AnswerCell::One(answer) => Some(answer),
+        AnswerCell::Absent | AnswerCell::Several(_) => None,
+    }
+}
+
+/// Answer of each row in a column.
+fn column_answers(table: &Table, items: &[Item], column: &Column) -> Vec<Option<String>> {
+    items
+        .iter()
+        .map(|item| answer(table, item, column))
+        .collect()
+}
+
+/// Column whose answers identify options.
+///
+/// # Errors
+/// If two columns have different answers for a row; the error shows the row and the flags to choose a column.
+pub(in crate::data::ready_made) fn option_column<'a>(
+    table: &Table,
+    roles: &'a Roles,
+    items: &[Item],
+) -> Result<&'a Column, String> {
+    choose(table, roles, items, |column| {
+        option_candidate(table, items, column)
+    })
+}
+
+/// A column as candidate for the answers of questions with options; `None` if at most half of its answers identify options.
+fn option_candidate<'a>(
+    table: &Table,
+    items: &[Item],
+    column: &'a Column,
+) -> Option<Candidate<'a>> {
+    let none = OptionList::default();
+    let answers = column_answers(table, items, column);
+    let filled = answers.iter().flatten().count();
+    let by_format = AnswerFormat::ALL.map(|format| -> RowChoices {
+        items
+            .iter()
+            .zip(&answers)
+            .map(|(item, answer)| {
+                let options = item.options.as_deref().unwrap_or(&none);
+                format.inferred_choice_index(answer.as_ref()?, options)
+            })
+            .collect()
+    });
+    let most = by_format.iter().map(count_valid).max().unwrap_or(0);
+    if 2 * most <= filled {
+        return None;
+    }
+    let mut interpretations: Vec<RowChoices> = Vec::new();
+    for choices in by_format {
+        if count_valid(&choices) == most && !interpretations.contains(&choices) {
+            interpretations.push(choices);
+        }
+    }
+    Some(Candidate {
+        column,
+        interpretations,
+    })
+}
+
+/// Flag for a column without a role whose cells identify an option in every row, in the first format that fits; `None` if there is no
+/// such column.
+pub(in crate::data::ready_made) fn suggest_column(
+    table: &Table,
+    roles: &Roles,
+    items: &[Item],
+) -> Option<String> {
+    let none = OptionList::default();
+    for (index, name) in table.columns.iter().enumerate() {
+        if roles.uses(index) {
+            continue;
+        }
+        let column = Column::new(index, name);
+        let fitting = AnswerFormat::ALL.into_iter().find(|format| {
+            items.iter().all(|item| {
+                let options = item.options.as_deref().unwrap_or(&none);
+                answer(table, item, &column)
+                    .is_some_and(|answer| format.choice_index(&answer, options).is_some())
+            })
+        });
+        if let Some(format) = fitting {
+            return Some(map_flag(Role::Answer, name, Some(format)));
+        }
+    }
+    None
+}
+
+/// Column whose answers are yes or no. Other words count as a third answer.
+///
+/// # Errors
+/// As [`option_column`].
+pub(in crate::data::ready_made) fn yes_or_no_column<'a>(
+    table: &Table,
+    roles: &'a Roles,
+    items: &[Item],
+) -> Result<&'a Column, String> {
+    choose(table, roles, items, |column| {
+        yes_or_no_candidate(table, items, column)
+    })
+}
+
+/// A column as candidate for the answers of yes/no questions; `None` if it has no answers.
+fn yes_or_no_candidate<'a>(
+    table: &Table,
+    items: &[Item],
+    column: &'a Column,
+) -> Option<Candidate<'a>> {
+    let answers = column_answers(table, items, column);
+    if !answers.iter().any(Option::is_some) {
+        return None;
+    }
+    let mut interpretations = vec![parse_answers(&answers, yes_no_index)];
+    if answers
+        .iter()
+        .flatten()
+        .all(|answer| digit_index(answer).is_some())
+    {
+        interpretations.push(parse_answers(&answers, digit_index));
+    }
+    Some(Candidate {
+        column,
+        interpretations,
+    })
+}
+
+/// Index of yes or no for each answer, and a third index for other words.
+fn parse_answers(answers: &[Option<String>], parse: fn(&str) -> Option<usize>) -> RowChoices {
+    const OTHER: usize = usize::MAX;
+    answers
+        .iter()
+        .map(|answer| Some(parse(answer.as_ref()?).unwrap_or(OTHER)))
+        .collect()
+}
+
+/// Number of rows with a valid answer.
+fn count_valid(choices: &RowChoices) -> usize {
+    choices.iter().flatten().count()
+}
+
+/// Chooses the first candidate with a single interpretation, else the first candidate, else the first column.
+///
+/// # Errors
+/// If another candidate contradicts the chosen one.
+fn choose<'a>(
+    table: &Table,
+    roles: &'a Roles,
+    items: &[Item],
+    candidate: impl Fn(&'a Column) -> Option<Candidate<'a>>,
+) -> Result<&'a Column, String> {
+    if let [only] = &*roles.answers {
+        return Ok(only);
+    }
+    let candidates: Vec<Candidate<'a>> = roles.answers.iter().filter_map(candidate).collect();
+    let unambiguous = candidates
+        .iter()
+        .find(|candidate| candidate.interpretations.len() == 1);
+    let Some(chosen) = unambiguous.or(candidates.first()) else {
+        return Ok(&roles.answers[0]);
+    };
+    for other in &candidates {
+        if let Some(row) = first_difference(chosen, other) {
+            return Err(differing_answers(
+                table,
+                &items[row],
+                chosen.column,
+                other.column,
+            ));
+        }
+    }
+    Ok(chosen.column)
+}
+
+/// Index of a row in which two columns differ in every interpretation; `None` if some interpretations agree.
+fn first_difference(one: &Candidate<'_>, other: &Candidate<'_>) -> Option<usize> {
+    let mut first = None;
+    for choices in &one.interpretations {
+        for other_choices in &other.interpretations {
+            let row = choices
+                .iter()
+                .zip(other_choices)
+                .position(|(one, other)| one.is_some() && other.is_some() && one != other)?;
+            first.get_or_insert(row);
+        }
+    }
+    first
+}
+
+/// Error message for two columns with different answers in a row.
+fn differing_answers(table: &Table, item: &Item, one: &Column, other: &Column) -> String {
+    format!(
+        "{}: the answers of {:?} and {:?} differ, {:?} and {:?}; {} or {} says which is meant",
+        table.place_in_set(item.row),
+        one.name,
+        other.name,
+        answer_excerpt(table, item, one),
+        answer_excerpt(table, item, other),
+        map_flag(Role::Answer, &one.name, None),
+        map_flag(Role::Answer, &other.name, None)
+    )
+}
+
+fn answer_excerpt(table: &Table, item: &Item, column: &Column) -> String {
+    excerpt(&answer(table, item, column).unwrap_or_default(), 60)
+}

@@ -1,0 +1,241 @@
+//! Column mapping given by the user with `--map`: [`ColumnMap`].
+
+use std::fmt;
+use std::str::FromStr;
+
+use super::names::Role;
+use crate::data::ready_made::choices::AnswerFormat;
+use crate::types::shell_word;
+
+/// Value of `--map`: roles and their columns.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct ColumnMap {
+    text: String,
+    pub(in crate::data::ready_made) entries: Vec<MapEntry>,
+}
+
+/// One `role=column` entry of a map.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(in crate::data::ready_made) struct MapEntry {
+    pub(super) role: Role,
+    /// One column, several (for options or images) or a template with `{Column}`; empty turns the role off.
+    pub(in crate::data::ready_made) columns: Vec<String>,
+    /// Text of `columns` before it was split at commas. A column with exactly this name takes precedence.
+    pub(super) unsplit: String,
+    pub(in crate::data::ready_made) format: CellFormat,
+}
+
+/// Format of the cells in a column.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(in crate::data::ready_made) enum CellFormat {
+    /// Not given, to be inferred.
+    Inferred,
+    /// Options in one cell, separated by this text.
+    Split(String),
+    /// Answers in this format.
+    Answer(AnswerFormat),
+}
+
+/// Writes a `--map` flag for one column, quoted for the shell, with the format of answers if one is given.
+pub(in crate::data::ready_made) fn map_flag(
+    role: Role,
+    column: &str,
+    format: Option<AnswerFormat>,
+) -> String {
+    let suffix = match format {
+        Some(format) => format!(":{}", format.name()),
+        // A colon ends a column name that contains colons: the text after the last colon is the format, and an empty one is inferred.
+        None if column.contains(':') && matches!(role, Role::Options | Role::Answer) => {
+            ":".to_owned()
+        }
+        None => String::new(),
+    };
+    let value = format!("{column}{suffix}");
+    format!("--map {}={}", role.name(), shell_word(&value))
+}
+
+impl ColumnMap {
+    /// Merges maps. An entry replaces earlier ones of the same role.
+    pub(in crate::data::ready_made) fn merge<'a>(maps: impl IntoIterator<Item = &'a Self>) -> Self {
+        let mut merged = Self::default();
+        for map in maps {
+            for entry in &map.entries {
+                merged.entries.retain(|known| known.role != entry.role);
+                merged.entries.push(entry.clone());
+            }
+        }
+        merged
+    }
+
+    /// Entry of a role; `None` if the map does not have the role.
+    pub(in crate::data::ready_made) fn entry(&self, role: Role) -> Option<&MapEntry> {
+        self.entries.iter().find(|entry| entry.role == role)
+    }
+}
+
+impl fmt::Display for ColumnMap {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text)
+    }
+}
+
+impl FromStr for ColumnMap {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let starts = entry_starts(text);
+        if starts.first() != Some(&0) {
+            let roles = Role::ALL.map(Role::name).join(", ");
+            return Err(format!(
+                "role=column expected, with one of the roles {roles}"
+            ));
+        }
+        let ends = starts[1..]
+            .iter()
+            .map(|start| start - 1)
+            .chain([text.len()]);
+        let mut entries: Vec<MapEntry> = Vec::new();
+        for (start, end) in starts.iter().zip(ends) {
+            let entry = parse_entry(&text[*start..end])?;
+            if entries.iter().any(|known| known.role == entry.role) {
+                return Err(format!("{} occurs twice", entry.role.name()));
+            }
+            entries.push(entry);
+        }
+        Ok(Self {
+            text: text.to_owned(),
+            entries,
+        })
+    }
+}
+
+/// Byte offsets of the entries: each `role=` at the start of the text or after a comma.
+fn entry_starts(text: &str) -> Vec<usize> {
+    std::iter::once(0)
+        .chain(text.match_indices(',').map(|(comma, _)| comma + 1))
+        .filter(|start| {
+            text[*start..]
+                .split_once('=')
+                .is_some_and(|(name, _)| Role::ALL.iter().any(|role| role.name() == name.trim()))
+        })
+        .collect()
+}
+
+/// Parses one entry: `role=column`, or `role=column:format` for options and answers.
+fn parse_entry(text: &str) -> Result<MapEntry, String> {
+    let (name, value) = text.split_once('=').ok_or("role=column expected")?;
+    let name = name.trim();
+    let role = Role::ALL
+        .into_iter()
+        .find(|role| role.name() == name)
+        .ok_or_else(|| format!("no role {name:?}"))?;
+    let (column, format) = match (role, value.rsplit_once(':')) {
+        (Role::Options | Role::Answer, Some((column, ""))) => (column, CellFormat::Inferred),
+        (Role::Options, Some((column, split))) => {
+            let separator = split
+                .strip_prefix("split(")
+                .and_then(|rest| rest.strip_suffix(')'))
+                .filter(|separator| !separator.is_empty())
+                .ok_or("options=COLUMN:split(|) expected, with the signs between options")?;
+            let separator = separator.replace("\\n", "\n").replace("\\t", "\t");
+            (column, CellFormat::Split(separator))
+        }
+        (Role::Answer, Some((column, name))) => {
+            let format = AnswerFormat::from_name(name).ok_or_else(|| {
+                let names = AnswerFormat::ALL.map(AnswerFormat::name).join(", ");
+                format!("answer=COLUMN:HOW expected, with one of {names}")
+            })?;
+            (column, CellFormat::Answer(format))
+        }
+        _ => (value, CellFormat::Inferred),
+    };
+    let is_list = matches!(role, Role::Options | Role::Image) && !column.contains('{');
+    let columns = if column.is_empty() {
+        Vec::new()
+    } else if is_list {
+        column
+            .split(',')
+            .map(|column| column.trim().to_owned())
+            .collect()
+    } else {
+        vec![column.trim().to_owned()]
+    };
+    Ok(MapEntry {
+        role,
+        columns,
+        unsplit: column.trim().to_owned(),
+        format,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = "id=nr,question=frage,image=pics/{bild}.png,options=auswahl:split(|),answer=richtig:index1,family=";
+
+    #[test]
+    fn map_names_columns_by_role() {
+        let map: ColumnMap = TEXT.parse().unwrap();
+        assert_eq!(map.to_string(), TEXT);
+        assert_eq!(
+            map.entry(Role::Image).unwrap().columns.clone(),
+            ["pics/{bild}.png"]
+        );
+        assert_eq!(
+            map.entry(Role::Family).unwrap().columns.clone(),
+            Vec::<String>::new()
+        );
+        assert_eq!(
+            map.entry(Role::Options).unwrap().format,
+            CellFormat::Split("|".into())
+        );
+        assert_eq!(
+            map.entry(Role::Answer).unwrap().format,
+            CellFormat::Answer(AnswerFormat::Index1)
+        );
+        assert_eq!(map.entry(Role::Hint), None);
+    }
+
+    #[test]
+    fn option_columns_split_at_commas() {
+        assert!("options=first,second:x,third".parse::<ColumnMap>().is_err());
+        let cells: ColumnMap = "options=first,second,answer=truth".parse().unwrap();
+        assert_eq!(
+            cells.entry(Role::Options).unwrap().columns,
+            ["first", "second"]
+        );
+        let comma: ColumnMap = "options=all:split(,)".parse().unwrap();
+        assert_eq!(
+            comma.entry(Role::Options).unwrap().format,
+            CellFormat::Split(",".into())
+        );
+        let line_break: ColumnMap = r"options=all:split(\n)".parse().unwrap();
+        assert_eq!(
+            line_break.entry(Role::Options).unwrap().format,
+            CellFormat::Split("\n".into())
+        );
+    }
+
+    #[test]
+    fn later_map_replaces_roles() {
+        let map: ColumnMap = TEXT.parse().unwrap();
+        let both = ColumnMap::merge([&map, &"id=,answer=x".parse().unwrap()]);
+        assert_eq!(both.entry(Role::Id).unwrap().columns, Vec::<String>::new());
+        assert_eq!(both.entry(Role::Question).unwrap().columns, ["frage"]);
+    }
+
+    #[test]
+    fn wrong_map_error_names_expected() {
+        for (text, expected) in [
+            ("frage", "one of the roles question, image"),
+            ("colour=frage", "one of the roles question, image"),
+            ("id=a,id=b", "id occurs twice"),
+            ("answer=a:second", "one of letter, text, index0, index1"),
+            ("options=a:split()", "split(|) expected"),
+        ] {
+            let problem = text.parse::<ColumnMap>().unwrap_err();
+            assert!(problem.contains(expected), "{text}: {problem}");
+        }
+    }
+}

@@ -1,0 +1,466 @@
+//! Roles of the columns of a set: [`Roles`].
+
+use std::collections::BTreeSet;
+
+use super::column::Column;
+use super::map::{CellFormat, ColumnMap, map_flag};
+use super::names::{Role, known_names, normalize};
+use super::template::Template;
+use crate::data::ready_made::cells::{Cell, ConversationPaths, Table};
+use crate::types::Choices;
+use crate::types::questions::letter;
+use crate::types::text::excerpt;
+
+/// Columns by role. If a role has several columns, they are in order of preference.
+#[derive(Debug)]
+pub(in crate::data::ready_made) struct Roles {
+    pub(in crate::data::ready_made) question: QuestionSource,
+    pub(in crate::data::ready_made) images: ImageColumns,
+    /// Columns with all options of a row in one cell.
+    pub(in crate::data::ready_made) option_lists: Vec<Column>,
+    /// Columns with one option each, in order.
+    pub(in crate::data::ready_made) option_cells: Vec<Column>,
+    pub(in crate::data::ready_made) answers: Vec<Column>,
+    pub(in crate::data::ready_made) ids: Vec<Column>,
+    pub(in crate::data::ready_made) hint: Option<Column>,
+    pub(in crate::data::ready_made) families: FamilyColumns,
+    pub(in crate::data::ready_made) evidence: Option<Column>,
+    pub(in crate::data::ready_made) scene: Option<Column>,
+    /// Text between the options in one cell, if given by the user.
+    pub(in crate::data::ready_made) option_separator: Option<String>,
+    pub(in crate::data::ready_made) in_question: OptionsInQuestion,
+}
+
+/// Source of the text of a question.
+#[derive(Debug)]
+pub(in crate::data::ready_made) enum QuestionSource {
+    Column(Column),
+    /// The question is in the image, according to the user. The prompt only refers to it.
+    Image,
+}
+
+impl QuestionSource {
+    /// Text of a question that is in its image.
+    pub(in crate::data::ready_made) const IN_IMAGE_TEXT: &str = "Answer the question in the image.";
+
+    /// Column of the text; `None` if the question is in the image.
+    pub(in crate::data::ready_made) fn column(&self) -> Option<&Column> {
+        match self {
+            Self::Column(column) => Some(column),
+            Self::Image => None,
+        }
+    }
+}
+
+/// Columns of the families.
+#[derive(Debug)]
+pub(in crate::data::ready_made) enum FamilyColumns {
+    /// Candidates by their names, in order of preference.
+    Candidates(Vec<Column>),
+    /// Column given by the user, or none.
+    Chosen(Option<Column>),
+}
+
+impl FamilyColumns {
+    fn as_slice(&self) -> &[Column] {
+        match self {
+            Self::Candidates(columns) => columns,
+            Self::Chosen(column) => column.as_slice(),
+        }
+    }
+}
+
+/// Treatment of options in the text of a question, if the row has no columns of options.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::data::ready_made) enum OptionsInQuestion {
+    Search,
+    /// There are no options, according to the user.
+    None,
+}
+
+/// Columns of the images.
+#[derive(Debug)]
+pub(in crate::data::ready_made) enum ImageColumns {
+    /// The first of these columns with an image.
+    First(Vec<Column>),
+    /// All of these columns.
+    All(Vec<Column>),
+    /// The file named by a template.
+    Template(Template),
+}
+
+impl Roles {
+    /// Assigns roles to the columns of a table, by the map, else by their names.
+    ///
+    /// # Errors
+    /// If a column of the map does not exist, there is no question column, or a row has several questions.
+    pub(in crate::data::ready_made) fn new(table: &Table, map: &ColumnMap) -> Result<Self, String> {
+        let question = columns_of(table, map, Role::Question)?;
+        refuse_several_questions(table, map)?;
+        let question = match (question.into_iter().next(), map.entry(Role::Question)) {
+            (Some(column), _) => QuestionSource::Column(column),
+            (None, Some(_)) => QuestionSource::Image,
+            (None, None) => return Err(no_question(table, map)?),
+        };
+        Self::with_question(table, map, question)
+    }
+
+    /// Assigns roles to the columns of a table whose question comes from elsewhere.
+    ///
+    /// # Errors
+    /// If a column of the map does not exist.
+    pub(crate) fn with_question(
+        table: &Table,
+        map: &ColumnMap,
+        question: QuestionSource,
+    ) -> Result<Self, String> {
+        let options_entry = map.entry(Role::Options);
+        let options = columns_of(table, map, Role::Options)?;
+        let (option_lists, option_cells) = match options_entry {
+            Some(_) if options.len() > 1 => (Vec::new(), options),
+            Some(_) => (options, Vec::new()),
+            None => (options, option_cells(table)),
+        };
+        let evidence = columns_of(table, map, Role::Evidence)?.into_iter().next();
+        Ok(Self {
+            question,
+            images: image_columns(table, map)?,
+            option_lists,
+            option_cells,
+            answers: columns_of(table, map, Role::Answer)?,
+            ids: columns_of(table, map, Role::Id)?,
+            hint: columns_of(table, map, Role::Hint)?.into_iter().next(),
+            families: match map.entry(Role::Family) {
+                Some(_) => {
+                    FamilyColumns::Chosen(columns_of(table, map, Role::Family)?.into_iter().next())
+                }
+                None => FamilyColumns::Candidates(columns_of(table, map, Role::Family)?),
+            },
+            evidence,
+            scene: columns_of(table, map, Role::Scene)?.into_iter().next(),
+            in_question: match options_entry {
+                Some(entry) if entry.columns.is_empty() => OptionsInQuestion::None,
+                _ => OptionsInQuestion::Search,
+            },
+            option_separator: options_entry.and_then(|entry| match &entry.format {
+                CellFormat::Split(separator) => Some(separator.clone()),
+                CellFormat::Inferred | CellFormat::Answer(_) => None,
+            }),
+        })
+    }
+
+    /// Columns of the question text, its options and its answer.
+    fn question_columns(&self) -> impl Iterator<Item = &Column> {
+        self.question
+            .column()
+            .into_iter()
+            .chain(&self.hint)
+            .chain(&self.option_lists)
+            .chain(&self.option_cells)
+            .chain(&self.answers)
+    }
+
+    /// Columns that are not read again after the questions are parsed. Images, ids, families, evidence and scenes are read later.
+    pub(in crate::data::ready_made) fn columns_to_clear(&self) -> BTreeSet<usize> {
+        let (ImageColumns::First(images) | ImageColumns::All(images)) = &self.images else {
+            // A template may name any column.
+            return BTreeSet::new();
+        };
+        let needed: BTreeSet<usize> = images
+            .iter()
+            .chain(&self.ids)
+            .chain(self.families.as_slice())
+            .chain(&self.evidence)
+            .chain(&self.scene)
+            .map(|column| column.index)
+            .collect();
+        self.question_columns()
+            .map(|column| column.index)
+            .filter(|index| !needed.contains(index))
+            .collect()
+    }
+
+    /// True if the column is used for a question, image, id or family.
+    pub(super) fn uses(&self, index: usize) -> bool {
+        let images = match &self.images {
+            ImageColumns::First(columns) | ImageColumns::All(columns) => columns.as_slice(),
+            ImageColumns::Template(_) => &[],
+        };
+        images
+            .iter()
+            .chain(self.families.as_slice())
+            .chain(&self.ids)
+            .chain(self.question_columns())
+            .any(|column| column.index == index)
+    }
+}
+
+/// Columns of a role: those in the map, else those with a known name, in order of preference.
+fn columns_of(table: &Table, map: &ColumnMap, role: Role) -> Result<Vec<Column>, String> {
+    if let Some(entry) = map.entry(role) {
+        if entry.columns.len() > 1
+            && let Some(index) = table.find(&entry.unsplit)
+        {
+            return Ok(vec![Column::new(index, &entry.unsplit)]);
+        }
+        return entry
+            .columns
+            .iter()
+            .map(|name| find_column(table, name))
+            .collect();
+    }
+    Ok(known_names(role)
+        .iter()
+        .flat_map(|name| {
+            table
+                .columns
+                .iter()
+                .enumerate()
+                .filter(move |(_, column)| normalize(column) == *name)
+                .map(|(index, column)| Column::new(index, column))
+        })
+        .collect())
+}
+
+/// Columns of images: by the map, else by their names and numbers.
+fn image_columns(table: &Table, map: &ColumnMap) -> Result<ImageColumns, String> {
+    let entry = map.entry(Role::Image);
+    if let Some([template]) = entry.map(|entry| &*entry.columns)
+        && template.contains('{')
+    {
+        return Template::parse(table, template, |name| find_column(table, name))
+            .map(ImageColumns::Template);
+    }
+    let columns = columns_of(table, map, Role::Image)?;
+    if entry.is_some() && columns.len() > 1 {
+        return Ok(ImageColumns::All(columns));
+    }
+    let numbered = numbered_columns(table, &["image", "img"]);
+    match columns.first() {
+        None => Ok(ImageColumns::All(numbered)),
+        Some(_) if numbered.is_empty() => Ok(ImageColumns::First(columns)),
+        // With numbered columns, a column without a number has one of several images.
+        Some(first) => Ok(ImageColumns::All(
+            std::iter::once(first.clone()).chain(numbered).collect(),
+        )),
+    }
+}
+
+/// Column without a role that most likely has the questions: the one with most texts that end in a question mark, else with most texts.
+fn likely_question_column(table: &Table) -> Option<&String> {
+    let known: BTreeSet<&String> = Role::ALL
+        .iter()
+        .flat_map(|role| known_names(*role))
+        .collect();
+    let option_cells = option_cells(table);
+    table
+        .columns
+        .iter()
+        .enumerate()
+        .filter(|(_, name)| {
+            !known.contains(&normalize(name))
+                && !option_cells.iter().any(|column| column.name == **name)
+        })
+        .map(|(index, name)| {
+            let texts: Vec<&String> = table
+                .rows
+                .iter()
+                .filter_map(|row| match row.cell(index) {
+                    Cell::Text(text) => Some(text),
+                    _ => None,
+                })
+                .collect();
+            let questions = texts
+                .iter()
+                .filter(|text| text.trim_end().ends_with(['?', '？']))
+                .count();
+            (questions, texts.len(), name)
+        })
+        .filter(|(_, texts, _)| *texts > 0)
+        .max_by_key(|(questions, texts, _)| (*questions, *texts))
+        .map(|(_, _, name)| name)
+}
+
+/// Error message for a table without a question column, with the `--map` flag that most likely helps.
+fn no_question(table: &Table, map: &ColumnMap) -> Result<String, String> {
+    let has_images = embedded_images(table).is_some();
+    let [options, answers] = [Role::Options, Role::Answer].map(|role| columns_of(table, map, role));
+    let is_unanswerable = options?.is_empty() && answers?.is_empty();
+    let remedy = match (
+        ConversationPaths::find(table),
+        likely_question_column(table),
+    ) {
+        (Some(ConversationPaths { question, answer }), _) => {
+            let answer = answer.map_or_else(String::new, |path| format!(",answer={path}"));
+            format!(
+                "it holds conversations, whose first question is read with {}",
+                map_flag(Role::Question, &format!("{question}{answer}"), None)
+            )
+        }
+        (None, Some(name)) => format!(
+            "say which is which, e.g. {}; {} if it stands in the image",
+            map_flag(Role::Question, name, None),
+            map_flag(Role::Question, "", None)
+        ),
+        (None, None) if is_unanswerable && has_images => {
+            "--ask home asks questions of its own about the images".to_owned()
+        }
+        (None, None) => format!(
+            "if the question stands in the image, {} asks {:?}; else say which is which: --map question=COLUMN,image=COLUMN,options=COLUMN,answer=COLUMN",
+            map_flag(Role::Question, "", None),
+            QuestionSource::IN_IMAGE_TEXT
+        ),
+    };
+    Ok(format!(
+        "no question among its columns:\n{}\n {remedy}",
+        describe_columns(table)
+    ))
+}
+
+/// A column with images in its cells.
+pub(crate) fn embedded_images(table: &Table) -> Option<Column> {
+    let is_image = |cell: &Cell| match cell {
+        Cell::Bytes(_) | Cell::File(_) => true,
+        Cell::Fields(fields) => fields.iter().any(|(name, _)| &**name == "bytes"),
+        _ => false,
+    };
+    let index = table
+        .rows
+        .iter()
+        .find_map(|row| (0..table.columns.len()).find(|index| is_image(row.cell(*index))))?;
+    Some(Column::new(index, &table.columns[index]))
+}
+
+/// Finds a column by its name, or a field of the structs in a column, such as `meta.source`.
+///
+/// # Errors
+/// If there is no such column; the error lists the columns.
+pub(in crate::data::ready_made) fn find_column(
+    table: &Table,
+    name: &str,
+) -> Result<Column, String> {
+    if let Some(index) = table.find(name) {
+        return Ok(Column::new(index, name));
+    }
+    if let Some((column, field)) = name.split_once('.')
+        && let Some(index) = table.find(column)
+    {
+        return Ok(Column::with_field(index, column, field));
+    }
+    let similar = table
+        .columns
+        .iter()
+        .find(|known| normalize(known) == normalize(name))
+        .map_or_else(String::new, |similar| {
+            format!("; did you mean {similar:?}?")
+        });
+    Err(format!(
+        "--map names the column {name:?}, which is not there{similar}\n{}",
+        describe_columns(table)
+    ))
+}
+
+/// Columns with one of these names and a number, in the order of their numbers.
+fn numbered_columns(table: &Table, names: &[&str]) -> Vec<Column> {
+    let mut found: Vec<(u32, Column)> = Vec::new();
+    for (index, column) in table.columns.iter().enumerate() {
+        let normalized = normalize(column);
+        let number = names
+            .iter()
+            .find_map(|name| normalized.strip_prefix(name))
+            .and_then(|digits| digits.parse().ok());
+        if let Some(number) = number {
+            found.push((number, Column::new(index, column)));
+        }
+    }
+    found.sort_by_key(|(number, _)| *number);
+    found.into_iter().map(|(_, column)| column).collect()
+}
+
+/// Columns with one option each: `A`, `B`, … (at least these two), or `option0`, `option_a`, `choice_a` and so on.
+fn option_cells(table: &Table) -> Vec<Column> {
+    let letters: Vec<Column> = (0..Choices::MOST)
+        .map_while(|option| {
+            let name = letter(option).to_string();
+            table.find(&name).map(|index| Column::new(index, &name))
+        })
+        .collect();
+    if letters.len() > 1 {
+        return letters;
+    }
+    let numbered = numbered_columns(table, &["option", "choice"]);
+    if numbered.len() > 1 {
+        return numbered;
+    }
+    let named: Vec<Column> = (0..Choices::MOST)
+        .map_while(|option| {
+            let letter = letter(option).to_ascii_lowercase();
+            let names = [format!("option{letter}"), format!("choice{letter}")];
+            let index = table
+                .columns
+                .iter()
+                .position(|column| names.contains(&normalize(column)))?;
+            Some(Column::new(index, &table.columns[index]))
+        })
+        .collect();
+    if named.len() > 1 { named } else { Vec::new() }
+}
+
+/// Refuses a table with several questions per row, unless the map chooses one.
+fn refuse_several_questions(table: &Table, map: &ColumnMap) -> Result<(), String> {
+    let questions = numbered_columns(table, &["question"]);
+    if questions.len() < 2 || map.entry(Role::Question).is_some() {
+        return Ok(());
+    }
+    let names: Vec<&str> = questions
+        .iter()
+        .map(|column| column.name.as_str())
+        .collect();
+    Err(format!(
+        "several questions per row, in the columns {}; one question per row is read: write a row for each, or take the ones in a column \
+         with {}",
+        names.join(", "),
+        map_flag(Role::Question, names[0], None)
+    ))
+}
+
+/// Maximum number of columns in a message (chosen).
+const MAX_LISTED_COLUMNS: usize = 40;
+
+/// Maximum length of all values in a message about a table, in characters (chosen).
+const MAX_VALUES_LENGTH: usize = 360;
+
+/// Maximum length of a column name in a message, in characters (chosen).
+const MAX_LISTED_NAME: usize = 40;
+
+/// Lists the columns with their kinds and an example value, one per line.
+pub(in crate::data::ready_made) fn describe_columns(table: &Table) -> String {
+    let width = table.columns.iter().map(|name| name.chars().count()).max();
+    let width = width.unwrap_or(0).min(24);
+    let columns = table.columns.len().clamp(1, MAX_LISTED_COLUMNS);
+    let max_value = (MAX_VALUES_LENGTH / columns).min(60);
+    let mut lines: Vec<String> = table
+        .columns
+        .iter()
+        .enumerate()
+        .take(MAX_LISTED_COLUMNS)
+        .map(|(index, name)| {
+            let cell = table
+                .rows
+                .iter()
+                .map(|row| row.cell(index))
+                .find(|cell| !cell.is_absent())
+                .unwrap_or(&Cell::Absent);
+            let name = excerpt(name, MAX_LISTED_NAME);
+            format!(
+                "   {name:width$}  {:8} {}",
+                cell.kind(),
+                cell.excerpt(max_value)
+            )
+        })
+        .collect();
+    if table.columns.len() > lines.len() {
+        lines.push(format!("   and {} more", table.columns.len() - lines.len()));
+    }
+    lines.join("\n")
+}

@@ -1,0 +1,223 @@
+//! Finds the files of a set in a folder, a downloaded repository, a ZIP file, a pattern or a file: [`find_files`].
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::archive::Archive;
+use super::choose::{choose_files, is_set};
+use super::shards::{check_shards, single_shard_note};
+use super::tree::Tree;
+use super::{SetFile, extension, is_zip_file};
+use crate::data::ready_made::settings::SetArgs;
+use crate::data::root::{Location, Root};
+use crate::error::{Error, Result};
+
+/// Files of a set, and the folders that may have its images.
+#[derive(Debug)]
+pub(in crate::data::ready_made) struct FoundFiles {
+    pub(in crate::data::ready_made) files: Vec<SetFile>,
+    /// Folder of the set.
+    pub(in crate::data::ready_made) folder: PathBuf,
+    /// Further folders that paths may lead to: the files of a hub's cache, or the folders of further `--data` files.
+    pub(in crate::data::ready_made) further: Vec<PathBuf>,
+    /// ZIP file of the set.
+    pub(in crate::data::ready_made) archive: Option<Arc<Archive>>,
+    /// Notes about skipped or missing files.
+    pub(in crate::data::ready_made) notes: Vec<String>,
+    pub(in crate::data::ready_made) joined: Joined,
+}
+
+/// Relation of several files to each other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::data::ready_made) enum Joined {
+    /// Parts of one table, which must have the same columns.
+    OneTable,
+    /// Files of a folder or a ZIP file, which may have different columns.
+    Folder,
+}
+
+/// True if a folder has a ready-made set, or cannot be scanned.
+pub(in crate::data) fn is_set_folder(folder: &Path) -> bool {
+    let Ok(tree) = Tree::from_folder(folder) else {
+        return true;
+    };
+    tree.files().is_ok_and(|(files, _)| is_set(&tree, &files))
+}
+
+/// Finds the files of a set.
+///
+/// # Errors
+/// If there are none, or it is not clear which to use; the error lists the files.
+pub(in crate::data::ready_made) fn find_files(
+    places: &[PathBuf],
+    args: &SetArgs,
+) -> Result<FoundFiles> {
+    match places {
+        [place] => files_at(place, args),
+        places => named_files(places, args),
+    }
+}
+
+/// Opens several files given by the user, in this order.
+fn named_files(places: &[PathBuf], args: &SetArgs) -> Result<FoundFiles> {
+    refuse_choice("several files", args)?;
+    let mut files = Vec::with_capacity(places.len());
+    for place in places {
+        if !place.is_file() || extension(place) == "zip" {
+            let problem = format_args!(
+                "{}: no file of questions; several --data name the files of one set",
+                place.display()
+            );
+            return Err(Error::usage("--data", problem));
+        }
+        if places.iter().filter(|other| *other == place).count() > 1 {
+            let problem = format_args!("{} is named twice", place.display());
+            return Err(Error::usage("--data", problem));
+        }
+        files.push(SetFile::open(place.clone(), String::new())?);
+    }
+    let mut folders = places.iter().map(|place| folder_of(place));
+    Ok(FoundFiles {
+        files,
+        folder: folders.next().unwrap_or_default(),
+        further: folders.collect(),
+        archive: None,
+        notes: check_shards(places)
+            .err()
+            .map(|e| e.to_string())
+            .into_iter()
+            .collect(),
+        joined: Joined::OneTable,
+    })
+}
+
+/// Folder of a file; `.` for a bare file name.
+fn folder_of(file: &Path) -> PathBuf {
+    match file.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder.to_owned(),
+        _ => PathBuf::from("."),
+    }
+}
+
+/// Refuses the flags that choose files of a folder.
+fn refuse_choice(text: &str, args: &SetArgs) -> Result<()> {
+    for (flag, value) in [
+        ("--read config", &args.config_name),
+        ("--read split", &args.split),
+    ] {
+        if let Some(value) = value {
+            let problem =
+                format_args!("{text} is not a folder from which {value:?} could be chosen");
+            return Err(Error::usage(flag, problem));
+        }
+    }
+    Ok(())
+}
+
+/// Finds the files of a folder, a ZIP file, a file or a pattern.
+fn files_at(place: &Path, args: &SetArgs) -> Result<FoundFiles> {
+    if place.is_dir() {
+        return files_in_tree(&Tree::from_folder(place)?, args);
+    }
+    let text = place.to_string_lossy();
+    if !place.is_file() && !text.contains(['*', '?', '[']) {
+        let problem = format_args!("{text}: no such file or folder");
+        return Err(Error::usage("--data", problem));
+    }
+    if is_zip_file(place) {
+        let archive = Arc::new(Archive::open(place)?);
+        return files_in_tree(&Tree::Archive(archive), args);
+    }
+    refuse_choice(&text, args)?;
+    if place.is_file() {
+        return Ok(FoundFiles {
+            files: vec![SetFile::open(place.to_owned(), String::new())?],
+            folder: place.parent().unwrap_or(Path::new("")).to_owned(),
+            further: Vec::new(),
+            archive: None,
+            joined: Joined::OneTable,
+            notes: single_shard_note(place).into_iter().collect(),
+        });
+    }
+    matching_files(place, &text, args)
+}
+
+/// Files that match a pattern. Links out of the folder before its first wildcard are skipped; a warning names the first.
+fn matching_files(place: &Path, text: &str, args: &SetArgs) -> Result<FoundFiles> {
+    let paths = glob::glob(text)
+        .map_err(|e| Error::usage("--data", format_args!("{text}: not a pattern: {e}")))?;
+    let folder: PathBuf = place
+        .iter()
+        .take_while(|part| !part.to_string_lossy().contains(['*', '?', '[']))
+        .collect();
+    let root = Root::new(&folder, &args.root.data_root)?;
+    let mut links_out = Vec::new();
+    let mut files = Vec::new();
+    for path in paths.filter_map(std::result::Result::ok) {
+        match root.locate(&path) {
+            Location::Inside if path.is_file() => files.push(path),
+            Location::Outside => links_out.push(path),
+            Location::Inside | Location::Missing => {}
+        }
+    }
+    root.warn_of_links_out(&links_out);
+    if files.is_empty() {
+        return Err(Error::usage(
+            "--data",
+            format_args!("{text}: no file has such a name"),
+        ));
+    }
+    check_shards(&files)?;
+    Ok(FoundFiles {
+        files: files
+            .into_iter()
+            .map(|path| SetFile::open(path, String::new()))
+            .collect::<Result<_>>()?,
+        folder,
+        further: Vec::new(),
+        archive: None,
+        joined: Joined::OneTable,
+        notes: Vec::new(),
+    })
+}
+
+/// Files of a folder or a ZIP file.
+fn files_in_tree(tree: &Tree, args: &SetArgs) -> Result<FoundFiles> {
+    let (all, outside) = tree.files()?;
+    let (chosen, card_note) = choose_files(tree, all, args)?;
+    let paths: Vec<PathBuf> = chosen
+        .iter()
+        .map(|file| tree.full_path(&file.path))
+        .collect();
+    check_shards(&paths)?;
+    let files = chosen
+        .into_iter()
+        .map(|file| tree.open(&file.path, file.config))
+        .collect::<Result<_>>()?;
+    let link_note = outside.first().map(|first| {
+        format!(
+            "links that lead out of the folder or nowhere, and were skipped: {}, as {}",
+            outside.len(),
+            first.display()
+        )
+    });
+    let notes = link_note.into_iter().chain(card_note).collect();
+    Ok(match tree {
+        Tree::Folder { folder, blobs } => FoundFiles {
+            files,
+            folder: folder.clone(),
+            further: blobs.iter().cloned().collect(),
+            joined: Joined::Folder,
+            archive: None,
+            notes,
+        },
+        Tree::Archive(archive) => FoundFiles {
+            files,
+            folder: archive.path.parent().unwrap_or(Path::new("")).to_owned(),
+            further: Vec::new(),
+            joined: Joined::Folder,
+            archive: Some(Arc::clone(archive)),
+            notes,
+        },
+    })
+}

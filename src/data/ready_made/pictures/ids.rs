@@ -1,0 +1,180 @@
+//! Ids of the questions of a set: [`Ids`].
+
+use std::collections::{HashMap, HashSet};
+
+use super::frames::{Frames, LocatedImage};
+use crate::data::ready_made::choices::ParsedQuestion;
+use crate::data::ready_made::columns::Column;
+use crate::data::ready_made::omissions::find_contradictions;
+use crate::error::Result;
+use crate::files::reading;
+use crate::types::{Digest, FrameId, QuestionId};
+
+/// Ids of the questions of a set.
+#[derive(Debug)]
+pub(in crate::data::ready_made) struct Ids {
+    texts: Vec<String>,
+    source: String,
+    note: Option<String>,
+    contradictions: Vec<[usize; 2]>,
+}
+
+impl Ids {
+    /// Pairs of indices of questions that are equal except for their answers.
+    pub(in crate::data::ready_made) fn contradictions(&self) -> &[[usize; 2]] {
+        &self.contradictions
+    }
+
+    /// Id of the question with this index.
+    pub(in crate::data::ready_made) fn id(&self, index: usize) -> QuestionId {
+        QuestionId(self.texts[index].clone())
+    }
+
+    /// Name of the column of ids, or `content`.
+    pub(in crate::data::ready_made) fn source(&self) -> &str {
+        &self.source
+    }
+
+    /// Note for the user about repeated questions.
+    pub(in crate::data::ready_made) fn note(&self) -> Option<String> {
+        self.note.clone()
+    }
+}
+
+/// How images are compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum ImageIdentity {
+    /// By their bytes. Every file is read.
+    Content,
+    /// Embedded images by digest, image files by name. No file is opened.
+    Name,
+}
+
+impl Frames<'_> {
+    /// Makes ids for the questions: from the first column with a different value for each, else from their content.
+    pub(in crate::data::ready_made) fn ids(&self, questions: &[ParsedQuestion]) -> Result<Ids> {
+        for column in &self.roles.ids {
+            let Some(texts) = self.unique_texts(column, questions) else {
+                continue;
+            };
+            let digests = self.digests(questions, ImageIdentity::Name)?;
+            return Ok(Ids {
+                texts,
+                source: column.name.clone(),
+                note: None,
+                contradictions: find_contradictions(questions, &digests),
+            });
+        }
+        let digests = self.digests(questions, ImageIdentity::Content)?;
+        let (texts, repeats) = ids_by_content(&digests);
+        let source = match &*self.roles.ids {
+            [] => "content".to_owned(),
+            [column, ..] => format!("content ({} does not tell all rows apart)", column.name),
+        };
+        let note = (repeats > 0).then(|| {
+            format!("questions that repeat an earlier one, with its image and options: {repeats}; each is asked again")
+        });
+        Ok(Ids {
+            texts,
+            source,
+            note,
+            contradictions: find_contradictions(questions, &digests),
+        })
+    }
+
+    /// Texts of the questions in a column; `None` if one is missing or two are equal.
+    fn unique_texts(&self, column: &Column, questions: &[ParsedQuestion]) -> Option<Vec<String>> {
+        let mut seen = HashSet::new();
+        questions
+            .iter()
+            .map(|question| {
+                let text = column
+                    .text(&self.table.rows[question.row])?
+                    .trim()
+                    .to_owned();
+                seen.insert(text.clone()).then_some(text)
+            })
+            .collect()
+    }
+
+    /// Digest of each question over its images, its text and its options.
+    fn digests(
+        &self,
+        questions: &[ParsedQuestion],
+        identity: ImageIdentity,
+    ) -> Result<Vec<Digest>> {
+        let mut files: HashMap<FrameId, Digest> = HashMap::new();
+        questions
+            .iter()
+            .map(|question| {
+                let images: Vec<Digest> = self
+                    .in_row(question.row)
+                    .map(|image| match (image?, identity) {
+                        (
+                            LocatedImage::Member(name) | LocatedImage::File(name, _),
+                            ImageIdentity::Name,
+                        ) => Ok(Digest::from_bytes(name.0.as_bytes())),
+                        (image, _) => self.image_digest(image, &mut files),
+                    })
+                    .collect::<Result<_>>()?;
+                let options = question.choices.texts().iter().map(String::as_bytes);
+                let images = images.iter().map(|image| &image.as_bytes()[..]);
+                let text = question.text.as_bytes();
+                Ok(Digest::from_parts(images.chain([text]).chain(options)))
+            })
+            .collect()
+    }
+
+    /// Digest of an image. `files` caches the digests of files.
+    fn image_digest(
+        &self,
+        image: LocatedImage,
+        files: &mut HashMap<FrameId, Digest>,
+    ) -> Result<Digest> {
+        let (name, digest) = match image {
+            LocatedImage::Cell { facts, .. } => return Ok(facts.digest),
+            LocatedImage::Frame(name) => return Ok(Digest::from_bytes(name.0.as_bytes())),
+            LocatedImage::Member(name) | LocatedImage::File(name, _)
+                if files.contains_key(&name) =>
+            {
+                return Ok(files[&name]);
+            }
+            LocatedImage::Member(name) => {
+                let bytes = match self.archive {
+                    Some(archive) => archive.read_image(&name.0)?,
+                    None => Vec::new(),
+                };
+                (name, Digest::from_bytes(&bytes))
+            }
+            LocatedImage::File(name, path) => {
+                let digest = Digest::from_bytes(&reading::bytes(&path)?);
+                (name, digest)
+            }
+        };
+        files.insert(name, digest);
+        Ok(digest)
+    }
+}
+
+/// Makes ids from the digests of the questions: 12 hexadecimal digits, and `-k` for the k-th repeat. Returns the ids and the number of
+/// repeats. The ids depend neither on the order of rows nor on file names.
+fn ids_by_content(digests: &[Digest]) -> (Vec<String>, usize) {
+    let mut counts: HashMap<String, usize> = HashMap::new();
+    let mut repeats = 0;
+    let ids = digests
+        .iter()
+        .map(|digest| {
+            let id = digest.to_string()[..12].to_owned();
+            let count = counts.entry(id.clone()).or_insert(0);
+            *count += 1;
+            match *count - 1 {
+                0 => id,
+                repeat => {
+                    repeats += 1;
+                    format!("{id}-{repeat}")
+                }
+            }
+        })
+        .collect();
+    (ids, repeats)
+}

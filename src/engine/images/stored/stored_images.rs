@@ -1,0 +1,248 @@
+//! Images in the image store: [`StoredImages`], and the place of one image ([`StoredPlace`]).
+
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+
+use crate::engine::image_cache::{Content, Entry, EntryFacts, ImageStore, Key, Shown, StoredKinds};
+use crate::engine::images::frames::{Source, SourceFrame};
+use crate::engine::images::notes::thumbnail::ShownObjects;
+use crate::engine::images::recipes::{ImageKeyFacts, Maker, Recipe};
+use crate::engine::images::stored::stored_findings::StoredFindings;
+use crate::engine::images::stored::stored_thumbnails::ThumbnailPlace;
+use crate::error::Result;
+use crate::pictures::Payload;
+use crate::types::{Condition, FrameId};
+use darkqa_enhance::ImageUse;
+
+/// The image store, with the settings that decide images besides their recipes.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct StoredImages<'a> {
+    store: &'a ImageStore,
+    maker: &'a Maker,
+}
+
+/// The facts that decide the file of an image.
+#[derive(Serialize)]
+struct StoredRecipe<'a> {
+    /// Content that is stored instead of the image; `None` if the image itself is stored.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    content: Option<Content>,
+    image: ImageKeyFacts<'a>,
+    program: &'static str,
+    /// `None` without an enhancer, because a degraded image depends neither on the machine nor on the runtime.
+    enhanced_with: Option<&'a Maker>,
+}
+
+impl<'a> StoredImages<'a> {
+    pub(crate) fn new(store: &'a ImageStore, maker: &'a Maker) -> Self {
+        Self { store, maker }
+    }
+
+    /// The findings about enhancers in the same store.
+    pub(crate) fn findings(self) -> StoredFindings<'a> {
+        StoredFindings::new(self.store, self.maker)
+    }
+
+    /// True if the store has the images of all frames of a source in a condition. They may be damaged.
+    ///
+    /// # Errors
+    /// If a frame cannot be shown in the condition.
+    pub(crate) fn has_all(
+        self,
+        recipe: &Recipe,
+        source: &Source,
+        condition: &Condition,
+    ) -> Result<bool> {
+        if condition.photograph().is_some() {
+            // Photographs in the dark are not stored.
+            return Ok(false);
+        }
+        for frame in &source.frames {
+            if !self.place(recipe, &source.name, frame, condition)?.exists() {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    /// The place of the image of a frame in a condition, or of its similarity alone if such images are not stored. `source` is the name of
+    /// the frame's source.
+    ///
+    /// # Errors
+    /// If the recipe lacks the noise profile of the condition.
+    pub(crate) fn place(
+        self,
+        recipe: &Recipe,
+        source: &FrameId,
+        frame: &SourceFrame,
+        condition: &Condition,
+    ) -> Result<StoredPlace<'a>> {
+        let stored_content = match (self.store.kinds(), &condition.enhancer) {
+            (StoredKinds::All, _) | (StoredKinds::Enhanced, Some(_)) => Content::Image,
+            (StoredKinds::Enhanced, None) => Content::Measures,
+        };
+        let key = |content: Content| {
+            Key::from_recipe(&StoredRecipe {
+                content: (content != Content::Image).then_some(content),
+                image: recipe.key_facts(source, frame, condition)?,
+                program: self.maker.program(),
+                enhanced_with: condition.enhancer.is_some().then_some(self.maker),
+            })
+        };
+        let raw = Condition {
+            enhancer: None,
+            ..condition.clone()
+        };
+        let shown = Shown {
+            content: stored_content,
+            enhancer: condition.enhancer.as_ref().map(ToString::to_string),
+            light: raw.to_string(),
+            format: recipe.format.to_string(),
+        };
+        Ok(StoredPlace {
+            store: self.store,
+            image: key(Content::Image)?,
+            similarity: match stored_content {
+                Content::Image => None,
+                Content::Measures | Content::Probe | Content::Thumbnail => {
+                    Some(key(Content::Measures)?)
+                }
+            },
+            shown,
+        })
+    }
+}
+
+/// The place of one image in the store, or of its similarity to the clean frame.
+#[derive(Debug, Clone)]
+pub(crate) struct StoredPlace<'a> {
+    store: &'a ImageStore,
+    image: Key,
+    /// Key of the similarity alone; `None` if the image is stored, whose notes include it.
+    similarity: Option<Key>,
+    shown: Shown,
+}
+
+/// Similarity of an image to its clean frame, both in the size sent; `None` for a measure that is undefined.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub(crate) struct Similarity {
+    /// PSNR in dB; undefined for equal images.
+    pub(crate) psnr: Option<f64>,
+    /// SSIM; undefined for images smaller than its window.
+    pub(crate) ssim: Option<f64>,
+}
+
+/// Notes about an image from the time it was made, stored with it.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub(crate) struct StoredNotes {
+    /// The image's part of its enhancer's usage note; `None` without an enhancer.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) enhanced: Option<ImageUse>,
+    /// Similarity to the clean frame; `None` if it was not measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) similarity: Option<Similarity>,
+}
+
+/// Parts of an image that a caller needs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Needed {
+    /// Only the image file.
+    Image,
+    /// The image file and its similarity to the clean frame.
+    Similarity,
+}
+
+/// An image from the store.
+pub(crate) struct StoredImage {
+    pub(crate) payload: Payload,
+    pub(crate) notes: StoredNotes,
+}
+
+impl<'a> StoredPlace<'a> {
+    /// True if the store keeps the image itself.
+    pub(crate) fn keeps_image(&self) -> bool {
+        self.similarity.is_none()
+    }
+
+    /// True if the store has a file of the image. It may be damaged.
+    fn exists(&self) -> bool {
+        self.store.contains(&self.image)
+    }
+
+    /// Reads the image; `None` if it or a needed note is missing. The recipe gives the file format.
+    pub(crate) fn read(&self, recipe: &Recipe, needed: Needed) -> Option<StoredImage> {
+        if self.similarity.is_some() {
+            return None;
+        }
+        let mut notes = None;
+        let entry = self.store.get(&self.image, Content::Image, |entry| {
+            let read: Option<StoredNotes> = serde_json::from_value(entry.facts.notes.clone()).ok();
+            notes = read.filter(|notes| {
+                let is_enhanced = self.shown.enhancer.is_some();
+                (!is_enhanced || notes.enhanced.is_some())
+                    && (needed == Needed::Image || notes.similarity.is_some())
+            });
+            notes.is_some()
+        })?;
+        let [width, height] = entry.size;
+        Some(StoredImage {
+            payload: Payload::from_file(entry.image, width, height, recipe.format),
+            notes: notes?,
+        })
+    }
+
+    /// Similarity of the image to its clean frame; `None` if the store does not have it without the image.
+    pub(crate) fn similarity(&self) -> Option<Similarity> {
+        let key = self.similarity.as_ref()?;
+        let mut similarity = None;
+        self.store.get(key, Content::Measures, |entry| {
+            let notes: Option<StoredNotes> = serde_json::from_value(entry.facts.notes.clone()).ok();
+            similarity = notes.and_then(|notes| notes.similarity);
+            similarity.is_some()
+        })?;
+        similarity
+    }
+
+    /// The place of the thumbnail of a frame in a condition, with crops of these objects.
+    pub(crate) fn thumbnail(
+        &self,
+        frame: &FrameId,
+        condition: &Condition,
+        objects: Option<ShownObjects<'_>>,
+    ) -> Option<ThumbnailPlace<'a>> {
+        ThumbnailPlace::new(
+            self.store,
+            &self.image,
+            &self.shown,
+            frame,
+            condition,
+            objects,
+        )
+    }
+
+    /// Adds an image and its notes to the store, or the similarity alone if such images are not stored. `took` is the time to make it.
+    pub(crate) fn write(&self, image: &Payload, notes: &StoredNotes, took: Duration) {
+        let facts = EntryFacts::new(
+            self.shown.clone(),
+            took.as_millis() as u64,
+            serde_json::json!(notes),
+        );
+        if let Some(key) = &self.similarity {
+            if notes.similarity.is_some() {
+                self.store.put(key, &Entry::from_facts(facts));
+            }
+            return;
+        }
+        let entry = Entry {
+            image: image.file().to_vec(),
+            size: [image.facts().width, image.facts().height]
+                .map(|pixels| u32::try_from(pixels).unwrap_or(u32::MAX)),
+            facts,
+        };
+        self.store.put(&self.image, &entry);
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,410 @@
+//! The `report` command for one run or several: [`report`].
+
+use std::fmt::Write;
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::alerts::{alerts, duplicate_folder_alerts};
+use super::baseline::{Baseline, FAIL_IF_WORSE};
+use super::choice::{files as report_files, text, write_flip_rows, write_report};
+use super::combine::{Combined, combine};
+use super::common::keep_common_items;
+use super::enhancers;
+use super::lenient_change::LenientChange;
+use super::report_folder::write_in_place;
+use super::whole_report::no_records;
+use super::{open, own_answers};
+use crate::error::{Error, Result};
+use crate::files;
+use crate::report::choice_report::ChoiceReport;
+use crate::report::json::SummaryRuns;
+use crate::report::products::PAGE;
+use crate::report::text::alert::Alert;
+use crate::runs::Outcome;
+use crate::runs::ShowArgs;
+use crate::runs::record_table;
+use crate::runs::sharded_run::{open_any_run, open_choice_run};
+use crate::runs::stored::{AnyRun, RunLayout, ShownModels, StoredRun, run_name};
+use crate::runs::{StdoutFormat, Syntax};
+use crate::store::now;
+use crate::store::{AddressChange, Store};
+use crate::types::manifests::{Counts, Status};
+use crate::types::{ChoiceDetail, Decides, ModelColumn, OpenDetail, TrialRef, Truths};
+use darkqa_score::answers::record::{self, Detail as _};
+
+/// The flags of `report`.
+#[derive(Debug, Args)]
+#[group(arg = "runs")]
+pub(crate) struct ReportArgs {
+    /// Run folders, or all shards of a run; several runs are compared
+    #[arg(value_name = "RUN", required = true, add = Decides::Nothing)]
+    pub runs: Vec<PathBuf>,
+    /// Read all stored replies again by the rules of this version; asks nothing, and stores the readings that changed
+    #[arg(long, add = Decides::Nothing)]
+    pub rescore: bool,
+    /// Where the report goes: report.html, tables as CSV and LaTeX, figures as SVG; default: the folder of the run if it
+    /// is one, else nowhere
+    #[arg(long, value_name = "DIR", add = Decides::Nothing)]
+    pub out: Option<PathBuf>,
+    /// Report only on the items that all models with images answered
+    #[arg(long, add = Decides::Nothing)]
+    pub common: bool,
+    /// Show also the models that the file of models no longer has, and those that it had with other settings
+    #[arg(long, add = Decides::Nothing)]
+    pub all: bool,
+    /// Further columns about models in tables, separated by commas; default: none
+    #[arg(long, value_name = "COLUMNS", value_enum, value_delimiter = ',', add = Decides::Nothing)]
+    pub columns: Vec<ModelColumn>,
+    /// An old run to compare with.
+    #[command(flatten)]
+    pub baseline: BaselineArgs,
+    /// How the report is printed.
+    #[command(flatten)]
+    pub show: ReportShowArgs,
+}
+
+/// The flags that determine how a report of stored runs is printed.
+#[derive(Debug, Args)]
+pub(crate) struct ReportShowArgs {
+    /// The formats that every report has.
+    #[command(flatten)]
+    pub show: ShowArgs,
+    /// Print the report as Markdown, for an issue or a README
+    #[arg(long, conflicts_with = "json", help_heading = "Output", add = Decides::Nothing)]
+    pub markdown: bool,
+}
+
+/// The flags of a comparison with an old run.
+#[derive(Debug, Args)]
+pub(crate) struct BaselineArgs {
+    /// Compare each model and condition with the same ones of an old run: new less old, on the items and images that both have;
+    /// default: no comparison
+    #[arg(long, value_name = "OLD", add = Decides::Nothing)]
+    pub baseline: Option<PathBuf>,
+    /// Exit with 1 if any model is detected to be worse than in OLD in any condition, else with 2 if a model or condition of OLD is not
+    /// compared or no verdict is possible. If no model changed, at most 5 % of reports exit with 1, whatever the number of models and
+    /// conditions. The report names the smallest loss detected with 80 % power. random and the observer do not count as models
+    #[arg(long, add = Decides::Nothing)]
+    pub fail_if_worse: bool,
+}
+
+impl ReportArgs {
+    fn shown_models(&self) -> ShownModels {
+        if self.all {
+            ShownModels::All
+        } else {
+            ShownModels::Current
+        }
+    }
+
+    /// True if the report is written into the folder of its only run.
+    pub(crate) fn writes_into_run(&self) -> bool {
+        let is_of_single_run = self.runs.len() == 1 && self.baseline.baseline.is_none();
+        is_of_single_run && self.out.is_none() && !self.common
+    }
+
+    /// Format of the report on standard output.
+    fn format(&self) -> StdoutFormat {
+        let format = self.show.show.format();
+        if self.show.markdown {
+            StdoutFormat {
+                syntax: Syntax::Markdown,
+                ..format
+            }
+        } else {
+            format
+        }
+    }
+}
+
+/// Reports on a run, or compares several of the same kind. With `--rescore`, changed readings are stored in their run.
+///
+/// # Errors
+/// If a folder holds no run, a record is broken, or the runs asked different questions.
+pub(crate) fn report(args: &ReportArgs) -> Result<Outcome> {
+    if args.baseline.fail_if_worse && args.baseline.baseline.is_none() {
+        let problem = "compares with an old run: name it with --baseline OLD";
+        return Err(Error::usage(FAIL_IF_WORSE, problem));
+    }
+    let (folders, duplicate_alerts) = distinct(&args.runs);
+    let (mut choice, mut open) = (Vec::new(), Vec::new());
+    for folder in folders {
+        match open_any_run(folder)? {
+            AnyRun::Choice(run) => choice.push(run),
+            AnyRun::Open(run) => open.push(run),
+        }
+    }
+    let outcome = match (choice.is_empty(), open.is_empty()) {
+        (_, true) => report_choices(args, choice, &duplicate_alerts)?,
+        (true, false) => report_open(args, open, &duplicate_alerts)?,
+        (false, false) => {
+            return Err(Error::usage(
+                "RUN",
+                "runs of questions with choices and of open questions cannot be compared; report each kind alone",
+            ));
+        }
+    };
+    Ok(outcome.in_format(args.format()))
+}
+
+/// Removes duplicates from folders; also returns alerts about them.
+pub(super) fn distinct(folders: &[PathBuf]) -> (Vec<&PathBuf>, Vec<Alert>) {
+    let mut counted = Vec::<(PathBuf, &PathBuf, usize)>::new();
+    for folder in folders {
+        // The error about an unreadable folder comes when it is opened.
+        let canonical = folder.canonicalize().unwrap_or_else(|_| folder.clone());
+        match counted.iter_mut().find(|(known, ..)| *known == canonical) {
+            Some((.., count)) => *count += 1,
+            None => counted.push((canonical, folder, 1)),
+        }
+    }
+    let duplicates: Vec<(String, usize)> = counted
+        .iter()
+        .filter(|(.., count)| *count > 1)
+        .map(|(_, folder, count)| (run_name(folder), *count))
+        .collect();
+    let folders = counted.into_iter().map(|(_, folder, _)| folder);
+    (folders.collect(), duplicate_folder_alerts(&duplicates))
+}
+
+fn report_choices(
+    args: &ReportArgs,
+    mut runs: Vec<StoredRun<ChoiceDetail>>,
+    duplicate_alerts: &[Alert],
+) -> Result<Outcome> {
+    let mut rescore_text = String::new();
+    for run in &mut runs {
+        if run.trials.is_empty() {
+            return Err(no_records(run.folder.clone()));
+        }
+        if args.rescore {
+            rescore_text += &reread(run)?;
+            let failed = run.trials.iter().map(TrialRef::failed);
+            run.manifest.counts = Counts::new(run.manifest.counts.trials, failed);
+        }
+        run.leave_out(args.shown_models());
+    }
+    if args.format().is_document() {
+        rescore_text.clear();
+    }
+    let new_and_old = match &args.baseline.baseline {
+        Some(folder) => {
+            let mut old =
+                open_choice_run(folder, "--baseline compares runs of questions with choices")?;
+            old.leave_out(args.shown_models());
+            Some((runs.clone(), old))
+        }
+        None => None,
+    };
+    let mut combined = combine(runs)?;
+    if combined.truths() == Truths::Unknown {
+        refuse_without_truths(args)?;
+    }
+    if args.common {
+        combined = keep_common_items(combined)?;
+    }
+    combined.listing.add_columns(&args.columns);
+    let baseline = new_and_old
+        .map(|(new, old)| Baseline::new(&combined, new, old))
+        .transpose()?;
+    let is_worse = match &baseline {
+        Some(baseline) if args.baseline.fail_if_worse => baseline.is_worse(combined.unit())?,
+        _ => false,
+    };
+    let in_folder =
+        args.out.is_none() && !args.common && baseline.is_none() && duplicate_alerts.is_empty();
+    let written = match &*combined.runs {
+        [run] if in_folder => {
+            let text = write_in_place(&run.folder, run.layout, &run.manifest, |target| {
+                write_report(target, &run.manifest, &combined, args.format())
+            })?;
+            text.map(|text| (run.folder.clone(), run.layout, text))
+        }
+        _ => None,
+    };
+    let (reported, table_folder) = if let Some((folder, layout, text)) = written {
+        // A run in shards has a record table in each shard instead.
+        let table_folder = (layout == RunLayout::Whole).then(|| folder.clone());
+        let reported = Outcome::wrote(folder, Status::Complete, text);
+        (reported, table_folder)
+    } else {
+        let reported = report_combined(&combined, baseline.as_ref(), args, duplicate_alerts)?;
+        (reported, None)
+    };
+    // Free the trials first, because the record table takes as much memory.
+    drop(combined);
+    if let Some(folder) = table_folder {
+        record_table::update(&folder, args.show.show.record_table())?;
+    }
+    // `Incomplete` makes the command exit with 1.
+    let status = if is_worse {
+        Status::Incomplete
+    } else {
+        Status::Complete
+    };
+    Ok(Outcome {
+        status,
+        output: rescore_text + &reported.output,
+        written: reported.written,
+    })
+}
+
+/// Refuses flags that need accuracies, for runs whose questions have no true answers.
+fn refuse_without_truths(args: &ReportArgs) -> Result<()> {
+    let flags = [
+        (
+            "--common",
+            args.common,
+            "each model is compared with its own answers, on the questions that it answered at L0",
+        ),
+        (
+            "--baseline",
+            args.baseline.baseline.is_some(),
+            "it compares accuracies, and nobody knows the true answers (--ask)",
+        ),
+    ];
+    match flags.iter().find(|(_, is_set, _)| *is_set) {
+        Some((flag, _, why)) => Err(Error::usage(*flag, format_args!("{why}: leave it out"))),
+        None => Ok(()),
+    }
+}
+
+/// Reports on joined runs. Writes the report only if `--out` is set.
+fn report_combined(
+    combined: &Combined,
+    baseline: Option<&Baseline>,
+    args: &ReportArgs,
+    duplicate_alerts: &[Alert],
+) -> Result<Outcome> {
+    if combined.truths() == Truths::Unknown {
+        let show = args.format();
+        let output =
+            own_answers::report_output(combined, duplicate_alerts, show, args.out.is_some())?;
+        return write_files(args, output.text, output.files);
+    }
+    let findings = combined.findings();
+    let runs = combined.manifests();
+    let mut all_alerts = duplicate_alerts.to_vec();
+    all_alerts.extend(alerts(combined, &findings));
+    let mut report =
+        ChoiceReport::new(&findings, all_alerts).with_enhancers(&enhancers::rows(&combined.runs));
+    if let Some(baseline) = baseline {
+        baseline.add_to(&mut report);
+    }
+    let list = SummaryRuns::Several(&runs);
+    let stdout_text = text(&report, &runs, list, args.format())?;
+    let files = match &args.out {
+        Some(out) => {
+            let files = report_files(&report, combined, list)?;
+            write_flip_rows(&findings, out)?;
+            files
+        }
+        None => Vec::new(),
+    };
+    write_files(args, stdout_text, files)
+}
+
+/// Writes the files of the report into `--out`, if it is set, and adds a line about them to the text.
+fn write_files(
+    args: &ReportArgs,
+    mut text: String,
+    contents: Vec<(String, Vec<u8>)>,
+) -> Result<Outcome> {
+    let Some(out) = &args.out else {
+        if !args.format().is_document() {
+            text += "report: not written; --out DIR writes one\n";
+        }
+        return Ok(Outcome::text(Status::Complete, text));
+    };
+    for (name, content) in contents {
+        files::write(&out.join(name), &content)?;
+    }
+    if !args.format().is_document() {
+        let _ = writeln!(text, "report: {}", out.join(PAGE).display());
+    }
+    Ok(Outcome::wrote(out, Status::Complete, text))
+}
+
+fn report_open(
+    args: &ReportArgs,
+    mut runs: Vec<StoredRun<OpenDetail>>,
+    duplicate_alerts: &[Alert],
+) -> Result<Outcome> {
+    let flags = [
+        ("--common", args.common),
+        ("--baseline", args.baseline.baseline.is_some()),
+    ];
+    if let Some((flag, _)) = flags.iter().find(|(_, is_set)| *is_set) {
+        let problem = "compares runs of questions with choices; marks of open questions have no such test: leave it out";
+        return Err(Error::usage(*flag, problem));
+    }
+    if let Some(run) = runs.iter().find(|run| run.trials.is_empty()) {
+        return Err(no_records(run.folder.clone()));
+    }
+    for run in &mut runs {
+        run.leave_out(args.shown_models());
+    }
+    let is_single = runs.len() == 1 && duplicate_alerts.is_empty();
+    let mut joined = open::combine(runs)?;
+    joined.alerts.splice(..0, duplicate_alerts.iter().cloned());
+    joined.listing.add_columns(&args.columns);
+    let scores = open::Scores::new(joined)?;
+    let run = &scores.run;
+    if is_single && args.out.is_none() {
+        let text = write_in_place(&run.folder, run.layout, &run.manifest, |target| {
+            scores.write(target, args.format())
+        })?;
+        if let Some(text) = text {
+            if run.layout == RunLayout::Whole {
+                record_table::update(&run.folder, args.show.show.record_table())?;
+            }
+            return Ok(Outcome::wrote(&run.folder, Status::Complete, text));
+        }
+    }
+    let files = match args.out {
+        Some(_) => scores.products()?,
+        None => Vec::new(),
+    };
+    write_files(args, scores.stdout_text(args.format())?, files)
+}
+
+/// Parses all stored replies again by the current rules. Stores the changed records and the version of the rules, and returns a text
+/// about the change.
+///
+/// # Errors
+/// If the run is in shards, or one of its files cannot be read or written.
+fn reread(run: &mut StoredRun<ChoiceDetail>) -> Result<String> {
+    if run.layout == RunLayout::Shards {
+        let problem = format!(
+            "{} holds the parts of a run, and their readings are stored in each: name the parts, or merge them with report merge, which reads all replies again",
+            run.folder.display()
+        );
+        return Err(Error::usage("--rescore", problem));
+    }
+    let mut store = Store::open(&run.folder, &run.manifest, AddressChange::Allowed)?;
+    let mut changed = 0;
+    let mut lenient_change = LenientChange::new(&run.manifest);
+    for trial in run.trials.iter() {
+        let record = run.record(trial)?;
+        let current = record::reread(record.clone())?;
+        lenient_change.add(&record.detail, &current.detail);
+        if current != record {
+            store.append(&current)?;
+            changed += 1;
+        }
+    }
+    store.sync()?;
+    let records = run.trials.len();
+    let mut lines = format!("{changed} of {records} records now read differently\n");
+    if !lenient_change.is_current() {
+        let _ = writeln!(lines, "{}", lenient_change.words());
+        run.manifest.reply_reading = ChoiceDetail::REPLY_READING.map(str::to_owned);
+        run.manifest.updated = now();
+        store.write_manifest(&run.manifest)?;
+    }
+    if changed > 0 {
+        *run = StoredRun::reread(&run.folder, run.manifest.clone())?;
+    }
+    Ok(lines)
+}

@@ -1,0 +1,216 @@
+//! Use of the enhancers of runs, in words: [`rows`] and [`enhancer_alerts`].
+
+use std::collections::BTreeSet;
+
+use super::join::JoinedRun;
+use crate::report::tables::EnhancerRow;
+use crate::report::text::alert::{Alert, AlertKind};
+use crate::types::manifests::{ELSEWHERE, EnhancerNote, JudgedImages, ProbeOutcome, TRAINED_ON};
+use crate::types::text::counted;
+
+/// One row for each enhancer and way of using it. Runs that used it in the same way share a row.
+pub(super) fn rows(runs: &[JoinedRun]) -> Vec<EnhancerRow> {
+    let mut rows: Vec<(EnhancerRow, BTreeSet<&str>)> = Vec::new();
+    for (run, name, note) in notes(runs) {
+        let row = EnhancerRow {
+            name: name.to_owned(),
+            how: how(note),
+            looks: looks(note),
+        };
+        match rows.iter_mut().find(|(known, _)| *known == row) {
+            Some((_, runs)) => drop(runs.insert(&run.name)),
+            None => rows.push((row, BTreeSet::from([&*run.name]))),
+        }
+    }
+    // The result must not depend on the order of the runs.
+    rows.sort_by(|(one, in_one), (other, in_other)| {
+        (&one.name, in_one).cmp(&(&other.name, in_other))
+    });
+    let names: Vec<String> = rows.iter().map(|(row, _)| row.name.clone()).collect();
+    rows.into_iter()
+        .map(|(mut row, runs)| {
+            if names.iter().filter(|name| **name == row.name).count() > 1 {
+                let runs: Vec<&str> = runs.into_iter().collect();
+                row.name = format!("{} in {}", row.name, runs.join(", "));
+            }
+            row
+        })
+        .collect()
+}
+
+/// Alerts about the enhancers.
+pub(super) fn enhancer_alerts(runs: &[JoinedRun]) -> Vec<Alert> {
+    let mut alerts: Vec<Alert> = Vec::new();
+    for (_, name, note) in notes(runs) {
+        let mut add = |text: String| {
+            let alert = Alert::new(AlertKind::Enhancer, text);
+            if !alerts.contains(&alert) {
+                alerts.push(alert);
+            }
+        };
+        let probe = note.probe.as_ref();
+        match probe.map(|probe| (probe.outcome, probe.problem.as_deref())) {
+            Some((ProbeOutcome::Overruled, Some(problem))) => add(format!(
+                "{name} was used because of --allow bad-enhancer although its images may be read in a wrong way: {problem}."
+            )),
+            Some((ProbeOutcome::Doubtful, Some(problem))) => {
+                add(format!(
+                    "{name}, used as its sidecar or preset states: {problem}."
+                ));
+            }
+            _ => {}
+        }
+        for remark in &note.remarks {
+            add(format!("{name}: {remark}."));
+        }
+        if let Some(ranges) = assumed_ranges(note) {
+            add(format!(
+                "{name}: {ranges} assumed. Neither sidecar nor preset states its value ranges, and its images of dark frames are plausible with {ranges}."
+            ));
+        }
+        if note.resized {
+            add(format!(
+                "Images were resized for {name}, so its results are not those of the model at their own size."
+            ));
+        }
+        if let Some(images) = burnt_out(note) {
+            add(format!("{name}: {images}."));
+        }
+        let JudgedImages { images, .. } = note.judged;
+        if note.judged.flaws() > 0 && probe.is_none_or(|probe| probe.problem.is_none()) {
+            add(format!(
+                "{} of {images} images that {name} made of dark frames have a flaw: {}.",
+                note.judged.flaws(),
+                flaws(&note.judged)
+            ));
+        }
+    }
+    alerts
+}
+
+fn notes(runs: &[JoinedRun]) -> impl Iterator<Item = (&JoinedRun, &str, &EnhancerNote)> {
+    runs.iter().flat_map(|run| {
+        run.manifest
+            .enhancers
+            .iter()
+            .map(move |(name, note)| (run, &**name, note))
+    })
+}
+
+/// The conventions for a network's input and output, each with its source.
+fn how(note: &EnhancerNote) -> String {
+    [
+        convention(note, ELSEWHERE, "enhanced "),
+        convention(note, "preset", "preset "),
+        convention(note, TRAINED_ON, "trained on "),
+        convention(note, "range_in", "fed "),
+        convention(note, "color", "colours "),
+        convention(note, "input = ", "input = "),
+        convention(note, "channels", "channels "),
+        convention(note, "range_out", "read as "),
+        convention(note, "image = ", "image = "),
+        convention(note, "rounding", "to bytes: "),
+        unread_outputs(note),
+        Some(note.sizes.clone()).filter(|sizes| !sizes.is_empty()),
+    ]
+    .into_iter()
+    .flatten()
+    .collect::<Vec<_>>()
+    .join("; ")
+}
+
+fn convention(note: &EnhancerNote, key: &str, before: &str) -> Option<String> {
+    let line = note.convention.iter().find(|line| line.key == key)?;
+    Some(format!("{before}{} ({})", line.value, line.source))
+}
+
+/// The assumed value ranges, joined by "and"; `None` if none is assumed.
+fn assumed_ranges(note: &EnhancerNote) -> Option<String> {
+    let ranges: BTreeSet<&str> = note
+        .convention
+        .iter()
+        .filter(|line| line.key.starts_with("range_") && line.source == "assumed")
+        .map(|line| &*line.value)
+        .collect();
+    let ranges: Vec<&str> = ranges.into_iter().collect();
+    (!ranges.is_empty()).then(|| ranges.join(" and "))
+}
+
+/// The outputs of the graph that are not read; `None` if all are read.
+fn unread_outputs(note: &EnhancerNote) -> Option<String> {
+    let outputs: Vec<&str> = note
+        .convention
+        .iter()
+        .filter(|line| line.key == "not read")
+        .map(|line| &*line.value)
+        .collect();
+    (!outputs.is_empty()).then(|| format!("not read: {}", outputs.join(", ")))
+}
+
+/// The results of checking the enhanced images of the probe and of the run.
+fn looks(note: &EnhancerNote) -> String {
+    let probe = match &note.probe {
+        None => "no probe was run".to_owned(),
+        Some(probe) => match probe.outcome {
+            ProbeOutcome::Plausible => {
+                format!(
+                    "plausible on the {} of the probe",
+                    counted(probe.frames, "frame")
+                )
+            }
+            ProbeOutcome::Doubtful => "odd in the probe".to_owned(),
+            ProbeOutcome::Overruled => "refused by the probe, used all the same".to_owned(),
+        },
+    };
+    let judged = &note.judged;
+    match (judged.images, judged.flaws()) {
+        (0, _) => format!("{probe}; no image of the run was checked"),
+        (images, 0) => format!(
+            "{probe}; no flaw in the {} of the run that {} checked",
+            counted(images, "image"),
+            if images == 1 { "was" } else { "were" }
+        ),
+        (images, flawed) => format!(
+            "{probe}; a flaw in {flawed} of the {} of the run that {} checked: {}",
+            counted(images, "image"),
+            if images == 1 { "was" } else { "were" },
+            flaws(judged)
+        ),
+    }
+}
+
+/// The burnt-out images of each condition; `None` without any.
+fn burnt_out(note: &EnhancerNote) -> Option<String> {
+    let (first, images) = note.burnt_out.first_key_value()?;
+    let example = &images.example;
+    let parts: Vec<String> = note
+        .burnt_out
+        .iter()
+        .map(|(condition, found)| {
+            format!(
+                "{} at {condition} (on average {} % of the pixels)",
+                found.images,
+                found.percents / found.images.max(1)
+            )
+        })
+        .collect();
+    Some(format!(
+        "images are burnt out, with codes of 254 or 255 where the dark ones have detail: {}; for example {example} at {first}",
+        parts.join(", ")
+    ))
+}
+
+/// The number of images with each flaw, and a few examples.
+fn flaws(judged: &JudgedImages) -> String {
+    let flaws: Vec<String> = judged
+        .flawed
+        .iter()
+        .map(|(flaw, count)| format!("{count} {}", flaw.words()))
+        .collect();
+    let examples: Vec<String> = judged
+        .examples
+        .iter()
+        .map(|image| format!("{} at {}", image.frame, image.condition))
+        .collect();
+    format!("{} (for example {})", flaws.join(", "), examples.join("; "))
+}

@@ -1,0 +1,63 @@
+//! Runs for the `figures` command: [`FigureRuns`].
+
+use std::path::PathBuf;
+
+use super::alerts::alerts;
+use super::combine::{Combined, combine};
+use super::command::distinct;
+use super::whole_report::without_hidden_models;
+use crate::error::{Error, Result};
+use crate::report::text::alert::Alert;
+use crate::runs::sharded_run::open_choice_run;
+use crate::types::{Thumbnail, Truths};
+use darkqa_score::findings::Findings;
+
+/// Runs of questions with choices, joined as `report` joins them.
+pub(crate) struct FigureRuns {
+    combined: Combined,
+    duplicate_alerts: Vec<Alert>,
+}
+
+impl FigureRuns {
+    /// Opens the runs of these folders.
+    ///
+    /// # Errors
+    /// If a folder has no such run or no records, the runs asked different questions, or the true answers are unknown.
+    pub(crate) fn open(folders: &[PathBuf]) -> Result<Self> {
+        let (folders, duplicate_alerts) = distinct(folders);
+        let runs = folders
+            .into_iter()
+            .map(|folder| {
+                let problem = "figures draws runs of questions with choices; `report` draws the figures of these";
+                without_hidden_models(open_choice_run(folder, problem)?)
+            })
+            .collect::<Result<_>>()?;
+        let combined = combine(runs)?;
+        if combined.truths() == Truths::Unknown {
+            let problem = "the figures are of accuracies, and nobody knows the true answers (--ask): `report` draws the figures of \
+                           these runs";
+            return Err(Error::usage("figures", problem));
+        }
+        Ok(Self {
+            combined,
+            duplicate_alerts,
+        })
+    }
+
+    /// All results of the runs, computed from their records.
+    pub(crate) fn findings(&self) -> Findings<'_> {
+        self.combined.findings()
+    }
+
+    /// All alerts about the runs.
+    pub(crate) fn alerts(&self, findings: &Findings<'_>) -> Vec<Alert> {
+        let mut all = self.duplicate_alerts.clone();
+        all.extend(alerts(&self.combined, findings));
+        all
+    }
+
+    /// The thumbnails that the runs stored.
+    pub(crate) fn thumbnails(&self) -> &[Thumbnail] {
+        &self.combined.thumbnails
+    }
+}

@@ -1,0 +1,418 @@
+//! The report on runs of open questions: [`Scores`] scores their records, and [`write()`] writes the report into the folder of a run.
+
+use std::collections::{BTreeMap, HashMap};
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+use super::alerts::{
+    empty_answer_alerts, joining_alerts, missing_alerts, open_early_ends, run_alerts,
+};
+use super::combine::command_path;
+use super::enhancers;
+use super::join::join;
+use super::judges;
+use super::listing::listing;
+use super::report_folder::ReportFolder;
+use super::whole_report::{WholeReport, with_summary};
+use crate::error::{Error, Result};
+use crate::report::markdown::MarkdownReport;
+use crate::report::openeqa::{OpenReport, ReportedAnswer, products, render, summary_json, tables};
+use crate::report::products::PAGE;
+use crate::report::tables::EnhancerRow;
+use crate::report::text::alert::{Alert, AlertKind};
+use crate::report::text::outcome_words;
+use crate::report::text::table::Table;
+use crate::runs::mark_index::MarkIndex;
+use crate::runs::mark_index::{JUDGE, PROTOCOL};
+use crate::runs::outcome::Outcome;
+use crate::runs::outcome::{StdoutFormat, Syntax};
+use crate::runs::predictions::{AnswerState, Prediction, predictions};
+use crate::runs::report_length::ReportLength;
+use crate::runs::stored::{RunLayout, ShownModels, StoredRun, sort_trials, text_setting};
+use crate::store::Store;
+use crate::types::flags::read_word;
+use crate::types::manifests::{RunManifest, Status};
+use crate::types::{
+    ModelListing, OpenDetail, QuestionId, Record, RunQuestion, Step, Thumbnail, TrialRef,
+};
+use darkqa_score::choice::llm_match::{Protocol, mark};
+use darkqa_score::model_in_condition::ModelInCondition;
+use darkqa_score::open::{
+    AnswerOutcome, Group, OpenSummary, QuestionGroups, ScoredAnswer, open_summary_listed,
+};
+
+/// Scored answers of a run, or of several joined into one.
+pub(crate) struct Scores {
+    pub(crate) run: OpenRun,
+    judge: Option<String>,
+    protocol: Protocol,
+    summary: OpenSummary,
+    answers: Vec<ReportedAnswer>,
+    alerts: Vec<Alert>,
+    enhancers: Vec<EnhancerRow>,
+}
+
+/// Alerts about answers without a score; empty if no answer is scored, because the run has no judge.
+fn unscored_alerts(summary: &OpenSummary) -> Vec<Alert> {
+    let cells = summary.cells.iter().filter(|cell| cell.group == Group::All);
+    if cells.clone().all(|cell| cell.scored() == 0) {
+        return Vec::new();
+    }
+    let counts: Vec<_> = cells
+        .map(|cell| (&cell.subject, [cell.planned - cell.scored(), cell.planned]))
+        .collect();
+    missing_alerts(&counts, "Scores")
+}
+
+impl Scores {
+    /// Scores a run by the marks of the judge in its manifest.
+    pub(super) fn new(joined: JoinedRuns) -> Result<Self> {
+        let JoinedRuns {
+            run,
+            mut alerts,
+            enhancers,
+            listing,
+        } = joined;
+        let judge = text_setting(&run.manifest, JUDGE).map(str::to_owned);
+        let protocol =
+            text_setting(&run.manifest, PROTOCOL).map_or(Ok(Protocol::Upstream), read_word)?;
+        let ids: Vec<&QuestionId> = run.questions.iter().map(|question| &question.id).collect();
+        let predictions = predictions(&run.records, &ids, protocol);
+        let marks = marks(&run, judge.as_deref());
+        let failures = failures(&run.records);
+        let (mut scored, mut answers) = (Vec::new(), Vec::new());
+        for prediction in predictions {
+            let question = ids[prediction.question];
+            let mark_record = match &prediction.state {
+                AnswerState::Text { answer, .. } => marks.get(question, answer).copied(),
+                AnswerState::Missing | AnswerState::Null => None,
+            };
+            let outcome = outcome(&prediction, mark_record, protocol);
+            let failure = failures
+                .get(&(question, prediction.subject.clone()))
+                .filter(|_| outcome == AnswerOutcome::Missing);
+            scored.push(ScoredAnswer {
+                subject: prediction.subject.clone(),
+                question: prediction.question,
+                outcome,
+                cut: matches!(prediction.state, AnswerState::Text { cut: true, .. }),
+            });
+            answers.push(ReportedAnswer {
+                subject: prediction.subject,
+                question: prediction.question,
+                answer: prediction.full_answer,
+                outcome,
+                judgement: mark_record.and_then(|record| record.reply.clone()),
+                failure: failure.cloned(),
+            });
+        }
+        let groups: Vec<QuestionGroups> = run.questions.iter().map(question_groups).collect();
+        let summary = open_summary_listed(&scored, &groups, &listing);
+        alerts.extend(unscored_alerts(&summary));
+        alerts.sort_by_key(|alert| alert.kind);
+        Ok(Self {
+            run,
+            judge,
+            protocol,
+            summary,
+            answers,
+            alerts,
+            enhancers,
+        })
+    }
+
+    /// True if the mark of an answer cannot be parsed.
+    fn has_unmarked(&self) -> bool {
+        self.answers
+            .iter()
+            .any(|answer| answer.outcome == AnswerOutcome::Unmarked)
+    }
+
+    pub(super) fn summary(&self) -> &OpenSummary {
+        &self.summary
+    }
+
+    fn report(&self) -> OpenReport<'_> {
+        OpenReport {
+            summary: &self.summary,
+            manifest: &self.run.manifest,
+            alerts: &self.alerts,
+            enhancers: &self.enhancers,
+            judge: self.judge.as_deref(),
+            protocol: self.protocol,
+            runs: self.run.runs(),
+            folder: command_path(&self.run.folder),
+            questions: &self.run.questions,
+            answers: &self.answers,
+            thumbnails: &self.run.thumbnails,
+        }
+    }
+
+    /// Files of the report by name, without the JSON summary.
+    pub(crate) fn products(&self) -> Result<Vec<(String, Vec<u8>)>> {
+        let report = self.report();
+        products(&report, &tables(&report))
+    }
+
+    /// Files of the report, including the JSON summary, and the report as Markdown.
+    pub(super) fn whole_report(&self) -> Result<WholeReport> {
+        let report = self.report();
+        let tables = tables(&report);
+        Ok(WholeReport {
+            files: files(&report, &tables)?,
+            markdown: MarkdownReport::for_open(&report, &tables, ReportLength::Summary).text(),
+        })
+    }
+
+    /// Text of the report for standard output.
+    pub(crate) fn stdout_text(&self, show: StdoutFormat) -> Result<String> {
+        let report = self.report();
+        self.formatted(&report, &tables(&report), show)
+    }
+
+    fn formatted(
+        &self,
+        report: &OpenReport<'_>,
+        tables: &[Table],
+        show: StdoutFormat,
+    ) -> Result<String> {
+        let folder = &self.run.folder;
+        match show.syntax {
+            Syntax::Json => summary_json(report, tables, Some(folder), show.length),
+            Syntax::Markdown => Ok(MarkdownReport::for_open(report, tables, show.length).text()),
+            Syntax::Text => Ok(render(report, tables, &self.run.folders())),
+        }
+    }
+
+    /// Writes the report of the run. Returns the text for standard output.
+    pub(super) fn write(
+        &self,
+        target: &ReportFolder<'_, OpenDetail>,
+        show: StdoutFormat,
+    ) -> Result<String> {
+        let report = self.report();
+        let tables = tables(&report);
+        target.write(&files(&report, &tables)?, &self.run.manifest)?;
+        let mut text = self.formatted(&report, &tables, show)?;
+        if !show.is_document() {
+            let page = target.path().join(PAGE);
+            let _ = writeln!(text, "report: {}", page.display());
+        }
+        Ok(text)
+    }
+}
+
+/// Files of the report of one run by name, including the JSON summary.
+fn files(report: &OpenReport<'_>, tables: &[Table]) -> Result<Vec<(String, Vec<u8>)>> {
+    let products = products(report, tables)?;
+    let summary = summary_json(report, tables, None, ReportLength::Summary)?;
+    Ok(with_summary(products, summary))
+}
+
+/// A run of open questions, or several joined into one, with complete records.
+pub(crate) struct OpenRun {
+    /// Name of the run; the first one's if several are joined.
+    name: String,
+    pub(crate) folder: PathBuf,
+    pub(crate) layout: RunLayout,
+    pub(crate) manifest: RunManifest,
+    /// Ordered by question, condition and model.
+    pub(crate) records: Vec<Record<OpenDetail>>,
+    pub(crate) questions: Vec<RunQuestion>,
+    pub(crate) thumbnails: Vec<Thumbnail>,
+    /// Joined runs after the first.
+    others: Vec<OtherRun>,
+}
+
+/// A run joined to the first one.
+struct OtherRun {
+    name: String,
+    folder: PathBuf,
+    manifest: RunManifest,
+}
+
+impl OpenRun {
+    /// Names and manifests of all runs.
+    fn runs(&self) -> Vec<(&str, &RunManifest)> {
+        let first = std::iter::once((&*self.name, &self.manifest));
+        let others = self.others.iter().map(|run| (&*run.name, &run.manifest));
+        first.chain(others).collect()
+    }
+
+    /// Folders of all runs.
+    fn folders(&self) -> Vec<&Path> {
+        let others = self.others.iter().map(|run| &*run.folder);
+        std::iter::once(&*self.folder).chain(others).collect()
+    }
+}
+
+/// Several runs joined into one.
+pub(super) struct JoinedRuns {
+    pub(super) run: OpenRun,
+    /// Alerts about differences between the runs and faults in their numbers.
+    pub(super) alerts: Vec<Alert>,
+    /// Use of each enhancer.
+    enhancers: Vec<EnhancerRow>,
+    /// Order, groups and marks of the models.
+    pub(super) listing: ModelListing,
+}
+
+/// Joins several runs into one by [`join`], with alerts about differences between them.
+///
+/// # Errors
+/// If the runs have different judges or protocols, or different questions under the same name.
+pub(super) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<JoinedRuns> {
+    judges::check_same_judge(&runs)?;
+    check_questions(&runs)?;
+    let joined = join(runs, is_answer)?;
+    let mut alerts = run_alerts(&joined);
+    alerts.extend(joining_alerts(&joined));
+    alerts.extend(open_early_ends(&joined));
+    if joined.runs.len() == 1 {
+        // The text and the page of a single run describe what is missing in more detail.
+        alerts.retain(|alert| alert.kind != AlertKind::NotComplete);
+    }
+    let enhancers = enhancers::rows(&joined.runs);
+    let listing = listing(&joined);
+    let mut runs = joined.runs.into_iter();
+    let first = runs
+        .next()
+        .ok_or_else(|| Error::usage("RUN", "no run is named"))?;
+    let mut trials = joined.trials;
+    let ids = joined.questions.iter().map(|question| &question.id);
+    sort_trials(&mut trials, ids, &first.manifest.models);
+    let mut records: Vec<Record<OpenDetail>> = trials.iter().map(TrialRef::record).collect();
+    // Marks keep the name under which the judge was asked, because a model listed under two names may also be the judge.
+    for record in records
+        .iter_mut()
+        .filter(|record| record.detail.step == Step::Mark)
+    {
+        record.model = joined.model_names.original_name(&record.model).to_owned();
+    }
+    alerts.extend(empty_answer_alerts(&records));
+    let run = OpenRun {
+        records,
+        others: runs
+            .map(|run| OtherRun {
+                name: run.name,
+                folder: run.folder,
+                manifest: run.manifest,
+            })
+            .collect(),
+        name: first.name,
+        folder: first.folder,
+        layout: first.layout,
+        manifest: first.manifest,
+        questions: joined.questions,
+        thumbnails: joined.thumbnails,
+    };
+    Ok(JoinedRuns {
+        run,
+        alerts,
+        enhancers,
+        listing,
+    })
+}
+
+/// Checks that questions with the same name are the same in all runs; their images may differ.
+fn check_questions(runs: &[StoredRun<OpenDetail>]) -> Result<()> {
+    let mut first_seen = HashMap::<&QuestionId, &RunQuestion>::new();
+    for run in runs {
+        for question in &run.questions {
+            let known = first_seen.entry(&question.id).or_insert(question);
+            if !known.is_same(&RunQuestion {
+                image: None,
+                ..question.clone()
+            }) {
+                let problem = format!(
+                    "the question {} is different in the other runs; report each run alone",
+                    question.id
+                );
+                let path = run.folder.clone();
+                return Err(Error::Run { path, problem });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Scores a run, and writes its report and manifest into its folder. The run is incomplete if a mark cannot be parsed.
+pub(crate) fn write(
+    store: &Store<OpenDetail>,
+    mut run: StoredRun<OpenDetail>,
+    show: StdoutFormat,
+) -> Result<Outcome> {
+    run.leave_out(ShownModels::Current);
+    let mut scores = Scores::new(combine(vec![run])?)?;
+    if scores.run.manifest.status == Status::Complete && scores.has_unmarked() {
+        scores.run.manifest.status = Status::Incomplete;
+    }
+    Ok(Outcome::wrote(
+        store.folder(),
+        scores.run.manifest.status,
+        scores.write(&ReportFolder::Run(store), show)?,
+    )
+    .in_format(show))
+}
+
+/// True if the trial asked for an answer, false if it asked for a mark. `TrialRef::is_answer` does not coerce to the `Fn` that [`join`] takes.
+fn is_answer(trial: TrialRef<'_, OpenDetail>) -> bool {
+    trial.is_answer()
+}
+
+/// Successful marks by the judge of a run.
+fn marks<'a>(run: &'a OpenRun, judge: Option<&str>) -> MarkIndex<&'a Record<OpenDetail>> {
+    let mut marks = MarkIndex::new(&run.questions);
+    for record in &run.records {
+        if Some(&*record.model) != judge || record.failure.is_some() {
+            continue;
+        }
+        if let (Step::Mark, Some(answer)) = (record.detail.step, &record.detail.judged) {
+            marks.add(&record.question, answer, record);
+        }
+    }
+    marks
+}
+
+/// Kind and message of the error of each failed answer, by question and subject.
+fn failures(records: &[Record<OpenDetail>]) -> BTreeMap<(&QuestionId, ModelInCondition), String> {
+    records
+        .iter()
+        .filter(|record| record.detail.step == Step::Answer)
+        .filter_map(|record| {
+            let failure = record.failure.as_ref()?;
+            let kind = outcome_words::failure_reason(failure.kind, failure.status);
+            let subject = ModelInCondition::new(&record.model, record.condition.as_ref());
+            let text = format!("{kind}: {}", failure.message);
+            Some(((&record.question, subject), text))
+        })
+        .collect()
+}
+
+/// Outcome of an answer, given the record of its mark.
+fn outcome(
+    prediction: &Prediction,
+    mark_record: Option<&Record<OpenDetail>>,
+    protocol: Protocol,
+) -> AnswerOutcome {
+    match (&prediction.state, mark_record) {
+        (AnswerState::Missing, _) => AnswerOutcome::Missing,
+        (AnswerState::Null, _) => AnswerOutcome::Null,
+        (AnswerState::Text { .. }, None) => AnswerOutcome::Unjudged,
+        (AnswerState::Text { .. }, Some(record)) => {
+            // Marks of earlier versions are parsed again, so that all tables use the same reading.
+            let reply = record.reply.as_deref().unwrap_or_default();
+            mark(reply, protocol).map_or(AnswerOutcome::Unmarked, AnswerOutcome::Marked)
+        }
+    }
+}
+
+/// Groups of a question. Its split is the first part of the episode's name.
+fn question_groups(question: &RunQuestion) -> QuestionGroups {
+    let episode = question.frame.0.clone();
+    QuestionGroups {
+        split: episode.split('/').next().unwrap_or_default().to_owned(),
+        category: question.family.name().to_owned(),
+        episode,
+    }
+}

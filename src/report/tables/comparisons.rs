@@ -1,0 +1,378 @@
+//! Tables of paired differences and their tests. Each kind of comparison has a table over all families and one by family.
+
+use super::pooled::too_few_clusters;
+use super::sections::{ENHANCERS, REAL};
+use crate::report::text::table::ColumnKind::{self, Count, Number, P, Percent, Points, Text};
+use crate::report::text::table::{Column, Table, TableBuilder, TableCell, TableFormat};
+use crate::report::text::words::{marked_reference, name};
+use crate::types::text::counted;
+use darkqa_score::choice::ParsingMode;
+use darkqa_score::cluster::ClusterUnit;
+use darkqa_score::comparisons::{Comparison, ComparisonKind, MIN_PAIRS};
+use darkqa_score::findings::Findings;
+use darkqa_score::significance::Significance;
+
+/// Maximum number of rows that the terminal shows of one kind of comparison. The CSV file has all rows.
+const MAX_ROWS: usize = 40;
+
+/// Tables of the differences in accuracy. Files also have the rows with lenient parsing of replies.
+pub(super) fn comparisons(findings: &Findings<'_>) -> Vec<Table> {
+    let mut tables = tables_by_kind(&findings.comparisons, findings.unit, accuracy_titles);
+    for kind in ComparisonKind::ALL {
+        let all: Vec<&Comparison> = findings
+            .comparisons
+            .iter()
+            .filter(|comparison| comparison.kind == kind)
+            .collect();
+        tables.push(table(kind, "", &all, ParsingMode::Lenient).in_files_only());
+    }
+    tables
+}
+
+/// Tables of the differences in agreement with the answers at L0. The file's last column is the name of the measure.
+pub(crate) fn agreement_comparisons(
+    comparisons: &[Comparison],
+    unit: ClusterUnit,
+    measure: &'static str,
+) -> Vec<Table> {
+    let mut tables = tables_by_kind(comparisons, unit, agreement_titles);
+    for table in &mut tables {
+        let caption = format!(
+            "{}, paired by question, in percentage points.",
+            table.caption
+        );
+        table.latex = table.latex.as_ref().map(|_| caption);
+        table.columns.push(Column {
+            kind: Text,
+            heads: "csv measure".into(),
+        });
+        for row in &mut table.rows {
+            for cell in &mut row.cells {
+                // An answer that differs from the one at L0 is not necessarily worse.
+                let verdict = match cell {
+                    TableCell::Significance(Significance::Better) => "agrees more",
+                    TableCell::Significance(Significance::Worse) => "agrees less",
+                    _ => continue,
+                };
+                *cell = TableCell::Text(verdict.to_owned());
+            }
+            row.cells.push(measure.into());
+        }
+    }
+    tables
+}
+
+/// Two tables for each kind of comparison: over all families, and by family.
+///
+/// `titles` returns the caption on the page and the heading in the terminal.
+fn tables_by_kind(
+    comparisons: &[Comparison],
+    unit: ClusterUnit,
+    titles: fn(ComparisonKind) -> (&'static str, Option<&'static str>),
+) -> Vec<Table> {
+    let mut tables = Vec::new();
+    for kind in ComparisonKind::ALL {
+        let (overall, by_family): (Vec<&Comparison>, Vec<&Comparison>) = comparisons
+            .iter()
+            .filter(|comparison| comparison.kind == kind)
+            .partition(|comparison| comparison.family.is_none());
+        let (caption, heading) = titles(kind);
+        let least_p_values = overall
+            .iter()
+            .map(|comparison| (comparison.least_holm, comparison.strict.paired.clusters));
+        let clusters_note = too_few_clusters(least_p_values, &unit.to_string());
+        let mut overall_table = table(kind, caption, &overall, ParsingMode::Strict);
+        overall_table.is_folded = !matches!(
+            kind,
+            ComparisonKind::Enhancer | ComparisonKind::RealSynthetic | ComparisonKind::RealEnhanced
+        );
+        if !overall.is_empty() {
+            overall_table.heading = heading.map(str::to_owned);
+            if kind == ComparisonKind::Enhancer {
+                let caption = "Enhanced against raw, paired by question, in percentage points.";
+                overall_table.latex = Some(caption.to_owned());
+            }
+            hide_rows_in_terminal(&mut overall_table, kind, &overall);
+            overall_table.notes.extend(clusters_note);
+            overall_table.notes.extend(too_few_items(&overall));
+        }
+        let caption = format!("{caption}, by family");
+        let mut family_table = table(kind, &caption, &by_family, ParsingMode::Strict);
+        family_table.is_folded = true;
+        tables.extend([overall_table, family_table]);
+    }
+    tables
+}
+
+/// Caption on the page and heading in the terminal for differences in accuracy.
+///
+/// The kind `Level` has no heading, because another table in the terminal shows accuracy by level.
+fn accuracy_titles(kind: ComparisonKind) -> (&'static str, Option<&'static str>) {
+    match kind {
+        ComparisonKind::Level => ("Each dark level less L0, raw", None),
+        ComparisonKind::Variant => (
+            "Sensor noise less exposure drop alone",
+            Some("Sensor noise against exposure drop alone, paired by question"),
+        ),
+        ComparisonKind::Enhancer => (
+            "Enhanced less raw",
+            Some("Enhanced against raw, paired by question"),
+        ),
+        ComparisonKind::EnhancerPair => (
+            "One enhancer less another",
+            Some("One enhancer against another, paired by question"),
+        ),
+        ComparisonKind::Model => (
+            "Model less model",
+            Some("Model against model, paired by question"),
+        ),
+        ComparisonKind::Blind => (
+            "With images less without",
+            Some("With images against without, paired by question"),
+        ),
+        ComparisonKind::Light => (
+            "Light less light",
+            Some("One light against another, same model, paired by question"),
+        ),
+        ComparisonKind::RealSynthetic => (
+            "Photographed in the dark less synthetic",
+            Some("Photographed in the dark against synthetic, paired by question"),
+        ),
+        ComparisonKind::RealEnhanced => (
+            "Photographed in the dark: enhanced less raw",
+            Some("Photographed in the dark, enhanced against raw, paired by question"),
+        ),
+    }
+}
+
+/// Caption on the page and heading in the terminal for differences in agreement with the answers at L0.
+///
+/// The level L0 in these comparisons is a second request with the same images.
+fn agreement_titles(kind: ComparisonKind) -> (&'static str, Option<&'static str>) {
+    match kind {
+        ComparisonKind::Level => (
+            "Agreement at each dark level less that of L0 again, raw",
+            Some("Agreement in the dark against that of L0 asked again, paired by question"),
+        ),
+        ComparisonKind::Variant => (
+            "Agreement with sensor noise less exposure drop alone",
+            Some("Agreement with sensor noise against exposure drop alone, paired by question"),
+        ),
+        ComparisonKind::Enhancer => (
+            "Agreement of enhanced less raw",
+            Some("Agreement of enhanced against raw, paired by question"),
+        ),
+        ComparisonKind::EnhancerPair => (
+            "Agreement with one enhancer less another",
+            Some("Agreement with one enhancer against another, paired by question"),
+        ),
+        ComparisonKind::Model => ("Model less model", None),
+        ComparisonKind::Blind => (
+            "Agreement with images less without",
+            Some("Agreement with images against without, paired by question"),
+        ),
+        ComparisonKind::Light => (
+            "Agreement in one light less another",
+            Some("Agreement in one light against another, same model, paired by question"),
+        ),
+        ComparisonKind::RealSynthetic => (
+            "Agreement on photographs in the dark less synthetic",
+            Some("Agreement on photographs in the dark against synthetic, paired by question"),
+        ),
+        ComparisonKind::RealEnhanced => (
+            "Agreement on photographs in the dark: enhanced less raw",
+            Some("Agreement on photographs in the dark, enhanced against raw, paired by question"),
+        ),
+    }
+}
+
+/// Note with the number of rows whose sides share too few items for a verdict; `None` if all share enough.
+fn too_few_items(comparisons: &[&Comparison]) -> Option<String> {
+    let count = comparisons
+        .iter()
+        .filter(|comparison| comparison.is_too_small())
+        .count();
+    (count > 0).then(|| {
+        let rows = counted(count, "row");
+        format!(
+            "too few: fewer than {MIN_PAIRS} items are shared in {rows}, so no verdict is given"
+        )
+    })
+}
+
+/// Hides rows beyond [`MAX_ROWS`] in the terminal, and adds notes about them.
+///
+/// For blind models, hides the enhanced conditions too, and all rows if images help in each condition.
+fn hide_rows_in_terminal(table: &mut Table, kind: ComparisonKind, comparisons: &[&Comparison]) {
+    let mut shown: Vec<usize> = (0..comparisons.len()).collect();
+    if kind == ComparisonKind::Blind {
+        // The terminal compares blind models with raw images only. The file also has the enhanced images.
+        shown.retain(|index| comparisons[*index].first.enhancer.is_none());
+        let all_are_better = shown
+            .iter()
+            .all(|index| comparisons[*index].verdict() == Some(Significance::Better));
+        if !shown.is_empty() && all_are_better {
+            let line = format!("better in all {} conditions", shown.len());
+            table.notes.push(line);
+            shown.clear();
+        }
+    }
+    if shown.len() > MAX_ROWS {
+        let hidden = shown.len() - MAX_ROWS;
+        let line = format!("{hidden} more rows are in comparisons.csv");
+        table.notes.push(line);
+        shown.truncate(MAX_ROWS);
+    }
+    for (index, row) in table.rows.iter_mut().enumerate() {
+        if !shown.contains(&index) {
+            row.hidden_in.push(TableFormat::Terminal);
+        }
+    }
+}
+
+fn table(
+    kind: ComparisonKind,
+    caption: &str,
+    comparisons: &[&Comparison],
+    mode: ParsingMode,
+) -> Table {
+    let section = match kind {
+        ComparisonKind::Enhancer | ComparisonKind::EnhancerPair => ENHANCERS,
+        ComparisonKind::RealSynthetic | ComparisonKind::RealEnhanced => REAL,
+        _ => "comparisons",
+    };
+    let builder =
+        TableBuilder::new("comparisons", comparisons.iter().copied()).page(section, caption);
+    let has_models_under_test = comparisons.iter().any(|one| !one.first.is_reference());
+    let builder = number_columns(subject_columns(builder, kind, has_models_under_test), mode);
+    builder
+        .column(
+            ColumnKind::Significance,
+            "csv verdict | terminal | page | latex",
+            |comparison| TableCell::verdict(comparison.verdict()),
+        )
+        .column(Text, "csv shown", |comparison| {
+            let verdict = comparison.verdict();
+            verdict.is_some_and(Significance::is_shown).to_string()
+        })
+        .column(Text, "csv mode", move |_| mode.name())
+        .build()
+}
+
+fn subject_columns(
+    builder: TableBuilder<&Comparison>,
+    kind: ComparisonKind,
+    has_models_under_test: bool,
+) -> TableBuilder<&Comparison> {
+    let builder = builder
+        .column(Text, "csv kind", |comparison| comparison.kind.name())
+        .column(Text, "csv model", |comparison| {
+            comparison.first.model.clone()
+        })
+        .column(Text, "latex Model", move |comparison| {
+            let is_reference = comparison.first.is_reference() && has_models_under_test;
+            marked_reference(comparison.first.model.clone(), is_reference)
+        })
+        .column(Text, "csv condition | latex Condition", |comparison| {
+            comparison.first.condition()
+        })
+        .column(Text, "csv against_model", |comparison| {
+            comparison.second.model.clone()
+        })
+        .column(Text, "csv against_condition", |comparison| {
+            comparison.second.condition()
+        })
+        .column(Text, "terminal model | page model", |comparison| {
+            comparison.first.model.clone()
+        })
+        .column(Text, "terminal condition | page condition", |comparison| {
+            comparison.first.condition()
+        });
+    let builder = match kind {
+        ComparisonKind::EnhancerPair
+        | ComparisonKind::Model
+        | ComparisonKind::Blind
+        | ComparisonKind::Light
+        | ComparisonKind::RealSynthetic => {
+            builder.column(Text, "terminal less | page less", |comparison| {
+                second_side_label(comparison)
+            })
+        }
+        // No column for the second side: the kind of comparison determines it.
+        ComparisonKind::Level
+        | ComparisonKind::Variant
+        | ComparisonKind::Enhancer
+        | ComparisonKind::RealEnhanced => builder,
+    };
+    builder.family(|comparison| comparison.family.as_ref())
+}
+
+fn number_columns(
+    builder: TableBuilder<&Comparison>,
+    mode: ParsingMode,
+) -> TableBuilder<&Comparison> {
+    let difference = "csv difference low high | terminal difference, 95 % interval | page difference [95 %] \
+                      | latex Difference [95\\,\\%]";
+    builder
+        .column(Count, "csv n | terminal n", |comparison| {
+            comparison.parsed(mode).paired.difference.n
+        })
+        .column(Number, "csv first", |comparison| {
+            comparison.parsed(mode).paired.first
+        })
+        .column(Percent, "csv second | latex Raw", |comparison| {
+            comparison.parsed(mode).paired.second
+        })
+        .column(Percent, "latex Enhanced", |comparison| {
+            comparison.parsed(mode).paired.first
+        })
+        .column(Points, difference, |comparison| {
+            comparison.parsed(mode).paired.difference
+        })
+        .column(Count, "latex Rescued / harmed", |comparison| {
+            format!(
+                "{} / {}",
+                comparison.parsed(mode).paired.gained,
+                comparison.parsed(mode).paired.lost
+            )
+        })
+        .column(
+            Count,
+            "csv only_first | terminal only first | page only first",
+            |comparison| comparison.parsed(mode).paired.gained,
+        )
+        .column(
+            Count,
+            "csv only_second | terminal only second | page only second",
+            |comparison| comparison.parsed(mode).paired.lost,
+        )
+        .column(Count, "page n", |comparison| {
+            comparison.parsed(mode).paired.difference.n
+        })
+        .column(P, "csv p_mcnemar | page p (McNemar)", |comparison| {
+            comparison.parsed(mode).paired.mcnemar
+        })
+        .column(P, "csv p | page p", |comparison| {
+            comparison.parsed(mode).paired.p
+        })
+        .column(
+            P,
+            "csv p_holm | terminal p (Holm) | page p (Holm) | latex $p$ (Holm)",
+            |comparison| comparison.parsed(mode).holm,
+        )
+}
+
+/// Model or condition of the second side, or both, without what the first side shares.
+fn second_side_label(comparison: &Comparison) -> String {
+    let (first, second) = (&comparison.first, &comparison.second);
+    match (first.model != second.model, comparison.kind) {
+        (true, ComparisonKind::Light) => name(second),
+        (true, _) => second.model.clone(),
+        (false, ComparisonKind::EnhancerPair) => second
+            .enhancer
+            .as_ref()
+            .map_or_else(String::new, ToString::to_string),
+        (false, ComparisonKind::Light | ComparisonKind::RealSynthetic) => second.condition(),
+        (false, _) => String::new(),
+    }
+}

@@ -1,0 +1,201 @@
+//! A model's own answers at L0 ([`LightAnswers`]), and trials scored against them.
+
+use std::collections::{HashMap, HashSet};
+
+use crate::choice::ParsingMode;
+use crate::estimate::Estimate;
+use darkqa_base::types::questions::CANNOT_TELL;
+use darkqa_base::types::{
+    ChoiceDetail, Condition, QuestionId, RunGroup, Treatment, TrialRef, Trials, UnreadReason, View,
+};
+
+/// Identity of a question for a model: its id and the order of its choices.
+type QuestionKey<'a> = (&'a QuestionId, &'a [String]);
+
+/// The first reply of one model to each question at L0: the reference for its other replies.
+pub(super) struct LightAnswers<'a> {
+    model: &'a str,
+    by_question: HashMap<QuestionKey<'a>, Vec<TrialRef<'a>>>,
+}
+
+/// Counts of a model's replies at L0.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LightReplies {
+    pub model: String,
+    /// Parsing of the replies.
+    pub mode: ParsingMode,
+    /// Number of questions about images that were asked at L0.
+    pub asked: usize,
+    /// Share of readable replies; `None` without a reply. Its `n` is the number of replies.
+    pub read: Option<Estimate>,
+    /// Number of refusals.
+    pub refused: usize,
+    /// Number of replies “cannot tell from the image”.
+    pub cannot_tell: usize,
+    /// True if the questions have this choice.
+    pub offers_cannot_tell: bool,
+}
+
+impl LightReplies {
+    /// True if no reply is readable.
+    pub fn is_unread(&self) -> bool {
+        self.read.is_none_or(|read| read.value <= 0.0)
+    }
+
+    /// Number of replies.
+    pub fn replies(&self) -> usize {
+        self.read.map_or(0, |read| read.n)
+    }
+}
+
+/// True if a trial is about an untouched image without an enhancer.
+pub(super) fn is_light(trial: TrialRef<'_>) -> bool {
+    let condition = trial.condition();
+    trial.view() == View::Image && condition.is_some_and(is_untouched)
+}
+
+fn is_untouched(condition: &Condition) -> bool {
+    condition.treatment == Treatment::Untouched && condition.enhancer.is_none()
+}
+
+/// Index of the choice parsed from the reply of a trial; `None` if no choice could be parsed.
+pub(super) fn chosen(trial: TrialRef<'_>, mode: ParsingMode) -> Option<usize> {
+    let reading = match mode {
+        ParsingMode::Strict => trial.strict(),
+        ParsingMode::Lenient => trial.lenient(),
+    };
+    reading?.chosen
+}
+
+/// True if a choice is “cannot tell from the image”.
+pub(super) fn is_cannot_tell(choice: &str) -> bool {
+    choice.trim().eq_ignore_ascii_case(CANNOT_TELL)
+}
+
+/// True if a reply is a refusal or was filtered.
+pub(super) fn is_refused(trial: TrialRef<'_>) -> bool {
+    let why = trial.strict().and_then(|reading| reading.why);
+    matches!(why, Some(UnreadReason::Refused | UnreadReason::Filtered))
+}
+
+impl<'a> LightAnswers<'a> {
+    /// Collects the replies of a model at L0.
+    pub(super) fn new(trials: &'a Trials<ChoiceDetail>, model: &'a str) -> Self {
+        let mut by_question = HashMap::<QuestionKey<'a>, Vec<TrialRef<'a>>>::new();
+        for trial in trials
+            .iter()
+            .filter(|trial| trial.model() == model)
+            .filter(|trial| is_light(*trial) && trial.repeat() == 0)
+        {
+            let key = (trial.question(), trial.choices());
+            by_question.entry(key).or_default().push(trial);
+        }
+        Self { model, by_question }
+    }
+
+    /// First reply to each question, in arbitrary order.
+    pub(super) fn first(&self) -> impl Iterator<Item = TrialRef<'a>> + '_ {
+        self.by_question
+            .values()
+            .filter_map(|trials| trials.first().copied())
+    }
+
+    /// Choice of the model at L0 for the question of a trial; `None` if it is unreadable or missing.
+    fn reference(&self, trial: TrialRef<'_>, mode: ParsingMode) -> Option<usize> {
+        let key = (trial.question(), trial.choices());
+        let own = run_group(trial);
+        let light = self
+            .by_question
+            .get(&key)?
+            .iter()
+            .find(|light| RunGroup::overlap(run_group(**light), own))?;
+        chosen(*light, mode)
+    }
+
+    /// Returns the trials of the model with its own answer at L0 as the truth. Questions without such an answer are left out.
+    ///
+    /// The first trial at L0 is the reference itself and is left out. If the question was asked again, the second trial takes its place, so
+    /// that it is paired with the first trial of every other condition.
+    pub(super) fn scored_against_light(
+        &self,
+        trials: &'a Trials<ChoiceDetail>,
+        mode: ParsingMode,
+    ) -> Trials<ChoiceDetail> {
+        let scored = trials
+            .iter()
+            .filter(|trial| trial.model() == self.model)
+            .filter_map(|trial| {
+                let repeat = if is_light(trial) {
+                    trial.repeat().checked_sub(1)?
+                } else {
+                    trial.repeat()
+                };
+                Some((trial, repeat, self.reference(trial, mode)?))
+            });
+        with_references(scored)
+    }
+
+    /// Returns the first readable trials of another model at L0, with the answers of this model as the truth.
+    pub(super) fn scored_against_other(
+        &self,
+        trials: &'a Trials<ChoiceDetail>,
+        other: &str,
+        mode: ParsingMode,
+    ) -> Trials<ChoiceDetail> {
+        let scored = trials
+            .iter()
+            .filter(|trial| trial.model() == other && is_light(*trial))
+            .filter(|trial| trial.repeat() == 0)
+            .filter(|trial| chosen(*trial, mode).is_some())
+            .filter_map(|trial| Some((trial, 0, self.reference(trial, mode)?)));
+        with_references(scored)
+    }
+
+    /// Counts the replies at L0, in one parsing.
+    pub(super) fn replies(&self, mode: ParsingMode) -> LightReplies {
+        let replied: Vec<TrialRef<'_>> = self.first().filter(|trial| !trial.failed()).collect();
+        let read = replied
+            .iter()
+            .filter(|trial| chosen(**trial, mode).is_some())
+            .count();
+        LightReplies {
+            model: self.model.to_owned(),
+            mode,
+            asked: self.by_question.len(),
+            read: Estimate::share(read, replied.len()),
+            refused: replied.iter().filter(|trial| is_refused(**trial)).count(),
+            cannot_tell: replied
+                .iter()
+                .filter_map(|trial| trial.choices().get(chosen(*trial, mode)?))
+                .filter(|choice| is_cannot_tell(choice))
+                .count(),
+            offers_cannot_tell: self.offers_cannot_tell(),
+        }
+    }
+
+    fn offers_cannot_tell(&self) -> bool {
+        let lists: HashSet<&[String]> = self
+            .by_question
+            .keys()
+            .map(|(_, choices)| *choices)
+            .collect();
+        lists
+            .iter()
+            .any(|choices| choices.iter().any(|choice| is_cannot_tell(choice)))
+    }
+}
+
+fn run_group(trial: TrialRef<'_>) -> Option<&RunGroup> {
+    trial.condition()?.group.as_ref()
+}
+
+/// Copies trials, each with a new repeat number and a reference answer as the truth.
+fn with_references<'t>(
+    scored: impl Iterator<Item = (TrialRef<'t>, u32, usize)>,
+) -> Trials<ChoiceDetail> {
+    let mut trials = Trials::default();
+    for (trial, repeat, reference) in scored {
+        trials.add_scored_against(trial, repeat, reference);
+    }
+    trials
+}

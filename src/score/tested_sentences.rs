@@ -1,0 +1,515 @@
+//! Multiple-testing correction of the tests behind the sentences of a report: [`Findings::correct_sentences`].
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+
+use super::answers::confusion::{AgainstClean, Confusion, FalseAnswer};
+use super::calibration::MIN_CONFIDENT_REPLIES;
+use super::choice::ParsingMode;
+use super::cluster::MIN_CLUSTERS;
+use super::comparisons::{BestInTheDark, ComparisonKind, PooledFinding, PooledKind};
+use super::findings::Findings;
+use super::grid::Grid;
+use super::model_in_condition::{ModelInCondition, models_under_test};
+use super::significance::ALPHA;
+use super::test_tree::{TestTree, adjust_p_values};
+use darkqa_base::types::degradations::Kind;
+use darkqa_base::types::{EnhancerName, Variant};
+
+/// A test, with the index of its finding if several exist.
+#[derive(Debug, Clone, Copy)]
+enum Test {
+    /// One level, pooled over models.
+    Pooled(usize),
+    /// Mean of several levels, pooled over models.
+    Averaged(usize),
+    Comparison(usize),
+    /// The leading model in the dark is the best.
+    Best,
+    /// The leading model in the dark is above what it reaches without seeing.
+    Sees,
+    /// The leader at the lighter levels and the leader in the dark differ at a level, by its index.
+    Lead(usize),
+    /// One family loses more than another.
+    Families(usize),
+    /// Answer collapse.
+    Collapse(usize),
+    /// Confidence exceeds accuracy.
+    Overconfident(usize),
+    /// Overconfidence is larger than at L0.
+    Growth(usize),
+    /// PSNR separates right from wrong answers.
+    Fidelity,
+}
+
+/// Weight of each main question: the cost of darkness, the effect of each enhancer, the best model, and photographs in the dark.
+const MAIN: f64 = 1.0;
+
+/// Weight of the noise tests, if the run has noise as well as the exposure drop.
+const NOISE: f64 = 0.5;
+
+/// Weight of all other questions together. They concern how accuracy is lost, not how much.
+const FURTHER: f64 = 0.5;
+
+/// Weight of a secondary variant relative to a main one (1). Sentences name it only if its result differs from that of the main one.
+const OTHER_VARIANT: f64 = 0.25;
+
+type Tests = TestTree<Test>;
+
+/// Contents of a run that determine how the significance level is divided between its tests.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RunContents {
+    pub models: usize,
+    pub enhancers: usize,
+    /// Number of variants of the last degradation kind: the noise profiles, if the run has noise.
+    pub lights: usize,
+    /// True if the run has noise as well as the exposure drop.
+    pub has_noise: bool,
+}
+
+impl RunContents {
+    /// Significance level of the first test of an enhancer at the darker levels of one variant; without enhancers, of the first test of
+    /// the cost of darkness. Later tests of the same question have this level or a larger one.
+    #[must_use]
+    pub fn first_significance_level(self) -> f64 {
+        let rank = u32::from(self.models > 1);
+        let main = MAIN * f64::from(1 + rank + self.enhancers as u32);
+        let noise = if self.has_noise { NOISE } else { 0.0 };
+        let share = ALPHA * MAIN / (main + noise + FURTHER) / self.lights.max(1) as f64;
+        if self.enhancers > 0 {
+            // An enhancer has a branch for the darker levels and one for the lighter ones.
+            share / 2.0
+        } else {
+            share
+        }
+    }
+}
+
+impl Findings<'_> {
+    /// Corrects the p-values of all tests behind sentences, separately for each parsing of the replies.
+    pub(super) fn correct_sentences(&mut self) {
+        let tree = report_tests(self);
+        for mode in ParsingMode::ALL {
+            for (test, p) in adjust_p_values(&tree, |test| test.p(self, mode)) {
+                test.set_p_report(self, mode, p);
+            }
+        }
+        self.tests = tree.count();
+        self.correct_comparisons_of_one_model();
+    }
+
+    /// Copies the corrected p-values of the pooled findings about a single model to the comparisons of the same two sides: a sentence about
+    /// one is about the other.
+    fn correct_comparisons_of_one_model(&mut self) {
+        let mut corrected = HashMap::new();
+        for finding in &self.pooled {
+            let [model] = &finding.models[..] else {
+                continue;
+            };
+            let kind = match finding.kind {
+                PooledKind::Darkness => ComparisonKind::Level,
+                PooledKind::Noise => ComparisonKind::Variant,
+                PooledKind::Enhancer => ComparisonKind::Enhancer,
+                PooledKind::Blind if finding.blind_models == [model.clone()] => {
+                    ComparisonKind::Blind
+                }
+                PooledKind::EnhancerPair | PooledKind::Blind | PooledKind::Hallucination(_) => {
+                    continue;
+                }
+            };
+            if finding.family.is_none() {
+                let sides = (
+                    kind,
+                    &**model,
+                    finding.level,
+                    &finding.variant,
+                    &finding.enhancer,
+                );
+                let p = [finding.strict.p_report, finding.lenient.p_report];
+                corrected.insert(sides, p);
+            }
+        }
+        for comparison in &mut self.comparisons {
+            let first = &comparison.first;
+            let Some(level) = first.level else {
+                continue;
+            };
+            let is_own = comparison.second.model == first.model && comparison.family.is_none();
+            let sides = (
+                comparison.kind,
+                &*first.model,
+                level,
+                &first.variant,
+                &first.enhancer,
+            );
+            if let Some([strict, lenient]) = corrected.get(&sides).filter(|_| is_own) {
+                comparison.strict.p_report = *strict;
+                comparison.lenient.p_report = *lenient;
+            }
+        }
+    }
+}
+
+/// Tree of all tests of a report. It depends on the questions asked, never on the answers.
+fn report_tests(findings: &Findings<'_>) -> Tests {
+    let sets = pooled_sets(findings);
+    let enhancers: BTreeSet<&EnhancerName> = sets.iter().filter_map(|set| set.enhancer).collect();
+    let best = findings
+        .best
+        .as_ref()
+        .filter(|best| best.is_possible())
+        .map(|best| {
+            let levels = 0..best.lighter.len() + best.levels.len();
+            [
+                TestTree::chain([Test::Best, Test::Sees].into_iter()),
+                TestTree::group(levels.map(|level| TestTree::leaf(Test::Lead(level)))),
+            ]
+        });
+    let fidelity = findings
+        .fidelity
+        .as_ref()
+        .filter(|fidelity| fidelity.within[0].is_some());
+    let further = [
+        kind_tests(findings, &sets, PooledKind::Blind),
+        below_blind(findings),
+        kind_tests(findings, &sets, PooledKind::Hallucination(FalseAnswer::No)),
+        kind_tests(findings, &sets, PooledKind::Hallucination(FalseAnswer::Yes)),
+        collapses(findings),
+        confidence(findings),
+        families(findings),
+        TestTree::group(fidelity.map(|_| TestTree::leaf(Test::Fidelity))),
+    ];
+    let main = [kind_tests(findings, &sets, PooledKind::Darkness)]
+        .into_iter()
+        .chain(enhancers.into_iter().map(|name| {
+            let own = sets.iter().filter(|set| set.enhancer == Some(name));
+            TestTree::group(own.map(|set| set.tests(findings)))
+        }))
+        .chain([TestTree::group(best.into_iter().flatten())])
+        .chain(photographs(findings));
+    TestTree::group(main.map(|branch| branch.with_weight(MAIN)).chain([
+        kind_tests(findings, &sets, PooledKind::Noise).with_weight(NOISE),
+        TestTree::group(further).with_weight(FURTHER),
+    ]))
+}
+
+/// Tests of the difference between two families, one per main variant.
+fn families(findings: &Findings<'_>) -> Tests {
+    let contrasts = findings.contrasts.iter().enumerate();
+    let main = contrasts.filter(|(_, found)| is_main(&findings.grid, &found.variant));
+    TestTree::group(main.map(|(index, _)| TestTree::leaf(Test::Families(index))))
+}
+
+/// Tests of the sets of one kind.
+fn kind_tests(findings: &Findings<'_>, sets: &[PooledSet<'_>], kind: PooledKind) -> Tests {
+    let own = sets.iter().filter(|set| set.kind == kind);
+    TestTree::group(own.map(|set| set.tests(findings)))
+}
+
+/// True for a main variant: it has the last degradation kind of its root, or no kind. Sentences about all other variants are limited to
+/// the cost of darkness.
+fn is_main(grid: &Grid<'_>, variant: &Variant) -> bool {
+    let root = variant.kind.map(Kind::root);
+    let last = grid
+        .variants()
+        .into_iter()
+        .map(|other| other.kind)
+        .filter(|kind| kind.map(Kind::root) == root)
+        .max();
+    variant.kind.is_none() || last == Some(variant.kind)
+}
+
+/// Pooled findings of one kind, variant and enhancer.
+struct PooledSet<'f> {
+    kind: PooledKind,
+    variant: &'f Variant,
+    enhancer: Option<&'f EnhancerName>,
+    /// Finding of each level with its index, in ascending order of levels.
+    levels: Vec<(usize, &'f PooledFinding)>,
+}
+
+/// Sets of pooled findings that sentences report, if a verdict is possible at one of their levels.
+fn pooled_sets<'f>(findings: &'f Findings<'_>) -> Vec<PooledSet<'f>> {
+    let mut sets: Vec<PooledSet<'f>> = Vec::new();
+    for (index, finding) in findings.pooled.iter().enumerate() {
+        // No sentence is about two enhancers.
+        if finding.family.as_ref() != finding.kind.only_family()
+            || finding.kind == PooledKind::EnhancerPair
+        {
+            continue;
+        }
+        let (kind, variant, enhancer) = (finding.kind, &finding.variant, finding.enhancer.as_ref());
+        let known = sets
+            .iter_mut()
+            .find(|set| (set.kind, set.variant, set.enhancer) == (kind, variant, enhancer));
+        match known {
+            Some(set) => set.levels.push((index, finding)),
+            None => sets.push(PooledSet {
+                kind,
+                variant,
+                enhancer,
+                levels: vec![(index, finding)],
+            }),
+        }
+    }
+    sets.retain(|set| {
+        let mut levels = set.levels.iter();
+        (set.kind == PooledKind::Darkness || is_main(&findings.grid, set.variant))
+            && levels.any(|(_, finding)| finding.strict.verdict.is_possible())
+    });
+    sets
+}
+
+impl PooledSet<'_> {
+    /// Tree of the tests of the set. Single levels come after their mean: the severe ones from the darkest level, the mild ones from the
+    /// brightest. If the effect grows with the level, all levels come after the means, from the darkest one.
+    fn tests(&self, findings: &Findings<'_>) -> Tests {
+        let weight = if is_main(&findings.grid, self.variant) {
+            1.0
+        } else {
+            OTHER_VARIANT
+        };
+        let averaged: Vec<(usize, &PooledFinding)> = findings
+            .averaged
+            .iter()
+            .enumerate()
+            .filter(|(_, mean)| {
+                mean.kind == self.kind
+                    && mean.variant == *self.variant
+                    && mean.enhancer.as_ref() == self.enhancer
+            })
+            .collect();
+        if self.kind.grows_with_the_level() {
+            let means = averaged.iter().map(|(index, _)| Test::Averaged(*index));
+            let levels = self.levels.iter().map(|(index, _)| Test::Pooled(*index));
+            return TestTree::chain(means.chain(levels.rev())).with_weight(weight);
+        }
+        let branches = [true, false].map(|is_severe| {
+            let mean = averaged
+                .iter()
+                .find(|(_, mean)| mean.is_severe() == is_severe)
+                .map(|(index, _)| Test::Averaged(*index));
+            let mut levels: Vec<Test> = self
+                .levels
+                .iter()
+                .filter(|(_, finding)| finding.is_severe() == is_severe)
+                .map(|(index, _)| Test::Pooled(*index))
+                .collect();
+            if is_severe {
+                levels.reverse();
+            }
+            match mean {
+                Some(mean) => TestTree::chain([mean].into_iter().chain(levels)),
+                None => TestTree::group(levels.into_iter().map(TestTree::leaf)),
+            }
+        });
+        TestTree::group(branches).with_weight(weight)
+    }
+}
+
+/// Comparisons of each family and model with the blind baseline, in order from the darkest level. If several models are pooled, each is also
+/// compared over all families.
+fn below_blind(findings: &Findings<'_>) -> Tests {
+    let mut chains = BTreeMap::<_, Vec<Test>>::new();
+    for (index, comparison) in findings.comparisons.iter().enumerate() {
+        let (first, second) = (&comparison.first, &comparison.second);
+        if findings.is_tested_against_blind(comparison)
+            && is_main(&findings.grid, &first.variant)
+            && comparison.strict.significance.is_possible()
+        {
+            let key = (
+                &first.model,
+                &second.model,
+                &comparison.family,
+                &first.variant,
+            );
+            chains.entry(key).or_default().push(Test::Comparison(index));
+        }
+    }
+    TestTree::group(
+        chains
+            .into_values()
+            .map(|tests| TestTree::chain(tests.into_iter().rev())),
+    )
+}
+
+/// Tests on dark photographs: the cost of darkness, the difference from synthetic images, and the effect of enhancers.
+fn photographs(findings: &Findings<'_>) -> Vec<Tests> {
+    let models = models_under_test(findings.grid.subjects.iter().map(|subject| &*subject.model));
+    let kinds = [
+        ComparisonKind::Level,
+        ComparisonKind::RealSynthetic,
+        ComparisonKind::RealEnhanced,
+    ];
+    kinds
+        .map(|kind| {
+            TestTree::group(
+                findings
+                    .comparisons
+                    .iter()
+                    .enumerate()
+                    .filter(|(_, comparison)| {
+                        let first = &comparison.first;
+                        comparison.kind == kind
+                            && comparison.family.is_none()
+                            && first.variant.photograph().is_some()
+                            && (first.enhancer.is_none() || kind == ComparisonKind::RealEnhanced)
+                            && models.contains(&*first.model)
+                            && comparison.strict.significance.is_possible()
+                    })
+                    .map(|(index, _)| TestTree::leaf(Test::Comparison(index))),
+            )
+        })
+        .into()
+}
+
+/// Subjects with raw images at the darkest level of each main variant, limited to the models that findings are pooled over.
+fn darkest<'f>(findings: &'f Findings<'_>) -> Vec<&'f ModelInCondition> {
+    let grid = &findings.grid;
+    let raw: Vec<&ModelInCondition> = grid
+        .subjects
+        .iter()
+        .filter(|subject| {
+            subject.enhancer.is_none()
+                && subject.variant.kind.is_some()
+                && is_main(grid, &subject.variant)
+                && findings
+                    .models_of(&subject.variant)
+                    .contains(&&*subject.model)
+        })
+        .collect();
+    raw.iter()
+        .copied()
+        .filter(|subject| {
+            let darkest = raw
+                .iter()
+                .filter(|other| other.variant == subject.variant)
+                .filter_map(|other| other.level)
+                .max();
+            subject.level == darkest
+        })
+        .collect()
+}
+
+/// Tests of answer collapse, one per model and family.
+fn collapses(findings: &Findings<'_>) -> Tests {
+    let darkest = darkest(findings);
+    TestTree::group(
+        findings
+            .confusions
+            .iter()
+            .enumerate()
+            .filter(|(_, confusion)| {
+                darkest.contains(&&confusion.subject) && against_clean(confusion).is_some()
+            })
+            .map(|(index, _)| TestTree::leaf(Test::Collapse(index))),
+    )
+}
+
+/// Comparison of a subject's most common answer with L0, if one was computed.
+fn against_clean(confusion: &Confusion) -> Option<&AgainstClean> {
+    confusion.collapse.as_ref()?.clean.as_ref()
+}
+
+/// Tests of each model's confidence: overconfidence, then its growth since L0.
+fn confidence(findings: &Findings<'_>) -> Tests {
+    if findings.grid.clusters < MIN_CLUSTERS {
+        return TestTree::group([]);
+    }
+    let darkest = darkest(findings);
+    let tested =
+        findings.calibrations.iter().enumerate().filter(|(_, row)| {
+            row.replies >= MIN_CONFIDENT_REPLIES && darkest.contains(&&row.subject)
+        });
+    TestTree::group(tested.map(|(index, row)| {
+        let grown = row.growth.map(|_| TestTree::leaf(Test::Growth(index)));
+        TestTree::with_branches(Test::Overconfident(index), grown.into_iter().collect())
+    }))
+}
+
+impl Test {
+    /// p-value before correction in a parsing; 1 if the test was not computed. Confidence and fidelity exist only in strict parsing.
+    fn p(self, findings: &Findings<'_>, mode: ParsingMode) -> f64 {
+        let best = match mode {
+            ParsingMode::Strict => findings.best.as_ref(),
+            ParsingMode::Lenient => findings.lenient_best.as_ref(),
+        };
+        let found = match self {
+            Self::Pooled(index) => Some(findings.pooled[index].parsed(mode).p),
+            Self::Averaged(index) => Some(findings.averaged[index].parsed(mode).p),
+            Self::Comparison(index) => Some(findings.comparisons[index].parsed(mode).paired.p),
+            Self::Best => best.map(BestInTheDark::p_leader),
+            Self::Sees => best.map(|best| best.gain.p),
+            Self::Lead(level) => {
+                best.and_then(|best| Some(best.crossing.as_ref()?.levels.get(level)?.p))
+            }
+            Self::Families(index) => Some(findings.contrasts[index].parsed(mode).p),
+            Self::Collapse(index) => {
+                against_clean(&findings.confusions[index]).map(|clean| clean.p(mode))
+            }
+            Self::Overconfident(index) => Some(findings.calibrations[index].overconfidence.p),
+            Self::Growth(index) => findings.calibrations[index].growth.map(|growth| growth.p),
+            Self::Fidelity => findings
+                .fidelity
+                .as_ref()
+                .and_then(|found| Some(found.within[0]?.p)),
+        };
+        found.unwrap_or(1.0)
+    }
+
+    /// Stores the corrected p-value.
+    fn set_p_report(self, findings: &mut Findings<'_>, mode: ParsingMode, p: f64) {
+        let p = Some(p);
+        let best = match mode {
+            ParsingMode::Strict => findings.best.as_mut(),
+            ParsingMode::Lenient => findings.lenient_best.as_mut(),
+        };
+        match self {
+            Self::Pooled(index) => findings.pooled[index].set_p_report(mode, p),
+            Self::Averaged(index) => findings.averaged[index].set_p_report(mode, p),
+            Self::Comparison(index) => {
+                let comparison = &mut findings.comparisons[index];
+                match mode {
+                    ParsingMode::Strict => comparison.strict.p_report = p,
+                    ParsingMode::Lenient => comparison.lenient.p_report = p,
+                }
+            }
+            Self::Best => {
+                if let Some(best) = best {
+                    best.p_report = p;
+                }
+            }
+            Self::Sees => {
+                if let Some(best) = best {
+                    best.gain.p_report = p;
+                }
+            }
+            Self::Lead(level) => {
+                let crossing = best.and_then(|best| best.crossing.as_mut());
+                if let Some(lead) = crossing.and_then(|crossing| crossing.levels.get_mut(level)) {
+                    lead.p_report = p;
+                }
+            }
+            Self::Families(index) => findings.contrasts[index].parsed_mut(mode).p_report = p,
+            Self::Collapse(index) => {
+                let found = &mut findings.confusions[index].collapse;
+                if let Some(clean) = found.as_mut().and_then(|found| found.clean.as_mut()) {
+                    clean.p_report[mode as usize] = p;
+                }
+            }
+            // Confidence and fidelity have one p-value, from strict parsing.
+            Self::Overconfident(_) | Self::Growth(_) | Self::Fidelity
+                if mode == ParsingMode::Lenient => {}
+            Self::Overconfident(index) => findings.calibrations[index].overconfidence.p_report = p,
+            Self::Growth(index) => {
+                if let Some(growth) = findings.calibrations[index].growth.as_mut() {
+                    growth.p_report = p;
+                }
+            }
+            Self::Fidelity => {
+                if let Some(found) = findings.fidelity.as_mut() {
+                    found.p_report = p;
+                }
+            }
+        }
+    }
+}
