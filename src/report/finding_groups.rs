@@ -76,10 +76,10 @@ const MAX_ENHANCERS: usize = 3;
 const MAX_CLAUSES: usize = 3;
 
 /// Findings of a report in groups, without empty groups.
-pub(super) struct FindingGroups<'a>(Vec<FindingGroup<'a>>);
+pub(crate) struct FindingGroups<'a>(Vec<FindingGroup<'a>>);
 
 /// Findings of one group, the most important kind first.
-pub(super) struct FindingGroup<'a> {
+pub(crate) struct FindingGroup<'a> {
     pub(super) title: &'static str,
     findings: Vec<Finding<'a>>,
     /// Index of the main finding; `None` if no finding is of a leading kind.

@@ -95,7 +95,7 @@ fn unlimited() -> f64 {
 }
 
 /// Number of tokens that a model counts for an image of this size in pixels; `None` for an unknown family.
-pub(in crate::ask) fn image_tokens(
+pub(crate) fn image_tokens(
     model: &str,
     detail: Option<ImageDetail>,
     width: u64,

@@ -12,7 +12,7 @@ use crate::ask::wire_kind::Wire;
 /// The key of an endpoint. If it comes from a file, the file is read again after a refusal with status 401: tokens of cloud accounts are
 /// valid for an hour, and keys are rotated.
 #[derive(Debug)]
-pub(in crate::ask) struct AccountKey {
+pub(crate) struct AccountKey {
     access: Access,
     state: Mutex<State>,
 }
@@ -29,8 +29,8 @@ struct State {
 
 /// Headers of a request, with the key that they carry.
 #[derive(Debug)]
-pub(in crate::ask) struct KeyedHeaders {
-    pub(in crate::ask) headers: HeaderMap,
+pub(crate) struct KeyedHeaders {
+    pub(crate) headers: HeaderMap,
     /// Number of the key.
     renewals: u32,
 }

@@ -37,7 +37,7 @@ const MAX_DOWNLOAD: Duration = Duration::from_hours(1);
 
 /// Time limits of one attempt. Only time in which the process runs counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::ask) struct Deadline {
+pub(crate) struct Deadline {
     /// Limit from the first byte sent to the last byte received.
     total: Duration,
     /// Limit between two chunks of the response; `None` for no such limit.
@@ -46,7 +46,7 @@ pub(in crate::ask) struct Deadline {
 
 impl Deadline {
     /// Limits for a response in one piece.
-    pub(in crate::ask) fn total(timeout: Duration) -> Self {
+    pub(crate) fn total(timeout: Duration) -> Self {
         Self {
             total: timeout,
             idle: None,
@@ -114,8 +114,8 @@ enum ReachedLimit {
 
 /// Pooled connections to a server, and its key.
 #[derive(Debug, Clone)]
-pub(in crate::ask) struct Connection {
-    pub(in crate::ask) base: BaseUrl,
+pub(crate) struct Connection {
+    pub(crate) base: BaseUrl,
     /// The key, and the filter that removes it.
     key: Arc<AccountKey>,
     client: Client,
@@ -127,10 +127,10 @@ pub(in crate::ask) struct Connection {
 }
 
 /// Response to one request.
-pub(in crate::ask) struct HttpResponse {
-    pub(in crate::ask) status: StatusCode,
-    pub(in crate::ask) headers: HeaderMap,
-    pub(in crate::ask) body: Vec<u8>,
+pub(crate) struct HttpResponse {
+    pub(crate) status: StatusCode,
+    pub(crate) headers: HeaderMap,
+    pub(crate) body: Vec<u8>,
     /// Time from sending the request to the last byte of the response.
     pub(super) duration: Duration,
 }
@@ -169,7 +169,7 @@ impl Connection {
     }
 
     /// Filter that removes the keys and passwords of the endpoint from text of the server.
-    pub(in crate::ask) fn scrub(&self) -> Arc<Scrub> {
+    pub(crate) fn scrub(&self) -> Arc<Scrub> {
         self.key.scrub()
     }
 
@@ -222,7 +222,7 @@ impl Connection {
     }
 
     /// Builds a request to a path below the base URL, with these fields in its query string.
-    pub(in crate::ask) fn request(
+    pub(crate) fn request(
         &self,
         method: Method,
         path: &str,
@@ -237,7 +237,7 @@ impl Connection {
 
     /// Sends a request without a streamed body, and again if the server refuses the key and its file has another one. A request with a
     /// streamed body is sent once.
-    pub(in crate::ask) async fn exchange_keyed(
+    pub(crate) async fn exchange_keyed(
         &self,
         request: RequestBuilder,
         headers: &HeaderMap,
@@ -257,7 +257,7 @@ impl Connection {
     }
 
     /// Sends a request once.
-    pub(in crate::ask) async fn exchange(
+    pub(crate) async fn exchange(
         &self,
         request: RequestBuilder,
         deadline: Deadline,
@@ -328,7 +328,7 @@ impl Connection {
 
     /// Sends a request once, and writes the body of a successful response to a file of at most `max_bytes` bytes; the body of the returned
     /// response is then empty. The download fails if no byte arrives for the timeout of a request.
-    pub(in crate::ask) async fn download(
+    pub(crate) async fn download(
         &self,
         request: RequestBuilder,
         headers: &HeaderMap,

@@ -115,12 +115,12 @@ impl Endpoint {
     }
 
     /// Adds a model with this id. Its state at the replicas is separate from that of other models.
-    pub(in crate::ask) fn add_model(&self, id: &str) -> ModelIndex {
+    pub(crate) fn add_model(&self, id: &str) -> ModelIndex {
         self.load_balancer.add_model(id.to_owned())
     }
 
     /// Maximum number of requests in flight at the moment, at all replicas that accept this model, within [`Sending::concurrency`].
-    pub(in crate::ask) fn width(&self, model: ModelIndex) -> usize {
+    pub(crate) fn width(&self, model: ModelIndex) -> usize {
         let width: usize = self.accepting_replicas(model).map(Replica::width).sum();
         width.max(1)
     }
@@ -141,21 +141,21 @@ impl Endpoint {
     }
 
     /// Vendor of the first replica; `None` if no table lists its host.
-    pub(in crate::ask) fn vendor(&self) -> Option<&'static Vendor> {
+    pub(crate) fn vendor(&self) -> Option<&'static Vendor> {
         self.replicas[0].vendor()
     }
 
-    pub(in crate::ask) fn has_key(&self) -> bool {
+    pub(crate) fn has_key(&self) -> bool {
         self.replicas[0].has_key()
     }
 
     /// Maximum number of retries of a question after charged requests without a reply.
-    pub(in crate::ask) fn paid_retries(&self) -> u32 {
+    pub(crate) fn paid_retries(&self) -> u32 {
         self.sending.paid_retries
     }
 
     /// Time for which requests had to wait for their turn so far.
-    pub(in crate::ask) fn held_back(&self) -> HeldBack {
+    pub(crate) fn held_back(&self) -> HeldBack {
         self.replicas
             .iter()
             .map(|replica| &replica.gate)
@@ -165,7 +165,7 @@ impl Endpoint {
     }
 
     /// Headers of every request through this API, for each replica.
-    pub(in crate::ask) fn headers(&self, wire: Wire) -> Result<Vec<HeaderMap>> {
+    pub(crate) fn headers(&self, wire: Wire) -> Result<Vec<HeaderMap>> {
         self.replicas
             .iter()
             .map(|replica| replica.headers(wire))
@@ -219,7 +219,7 @@ impl Endpoint {
 
     /// Sends a request, with retries after temporary failures. While the endpoint accepts no requests, the request waits without using a
     /// retry, for at most [`Sending::patience`]. The future may be dropped at any time.
-    pub(in crate::ask) async fn ask(&self, request: &Request<'_>) -> Result<Reply, AskError> {
+    pub(crate) async fn ask(&self, request: &Request<'_>) -> Result<Reply, AskError> {
         if self.replicas.len() > 1 {
             self.compared(&request.sent.parameters.model)
                 .get_or_init(|| async {
@@ -472,7 +472,7 @@ impl Endpoint {
     }
 
     /// Waits before a question is asked again whose reply does not count, at most until the endpoint is closed.
-    pub(in crate::ask) async fn wait_to_ask_again(&self) {
+    pub(crate) async fn wait_to_ask_again(&self) {
         self.sleep_unless_closed(self.sending.first_delay).await;
     }
 

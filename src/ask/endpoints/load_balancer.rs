@@ -34,7 +34,7 @@ pub(super) struct LoadBalancer(Mutex<State>);
 /// Index of a model among the models opened at an endpoint. Two models may have the same id and different settings, and so different
 /// refusals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::ask) struct ModelIndex(usize);
+pub(crate) struct ModelIndex(usize);
 
 #[derive(Debug)]
 struct State {

@@ -32,7 +32,7 @@ impl BaseUrl {
 
     /// The port, or the default port of the scheme.
     #[must_use]
-    pub(in crate::ask) fn port(&self) -> Option<u16> {
+    pub(crate) fn port(&self) -> Option<u16> {
         self.0.port_or_known_default()
     }
 
@@ -53,7 +53,7 @@ impl BaseUrl {
     }
 
     /// True if the URL has a path other than `/`.
-    pub(in crate::ask) fn has_path(&self) -> bool {
+    pub(crate) fn has_path(&self) -> bool {
         !self.0.path().trim_matches('/').is_empty()
     }
 

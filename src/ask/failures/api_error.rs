@@ -13,19 +13,19 @@ use crate::types::Usage;
 
 /// Error that a server reports in a response. Secrets are not yet removed.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub(in crate::ask) struct ApiError {
+pub(crate) struct ApiError {
     /// Error text of the server.
-    pub(in crate::ask) message: String,
+    pub(crate) message: String,
     /// Kind of error, such as `invalid_request_error` or `insufficient_quota`.
     pub(super) kind: Option<String>,
     /// Error code, such as `model_not_found`, or a number as text.
-    pub(in crate::ask) code: Option<String>,
+    pub(crate) code: Option<String>,
     /// Request field that caused the error.
-    pub(in crate::ask) param: Option<String>,
+    pub(crate) param: Option<String>,
     /// True if moderation rejected the content of the request, as opposed to the account.
     pub(super) is_moderated: bool,
     /// Wait stated in the error, in a field or in its text.
-    pub(in crate::ask) wait: Option<Duration>,
+    pub(crate) wait: Option<Duration>,
     /// Ids of the reached limits, such as `GenerateRequestsPerDayPerProject`.
     limits: Vec<String>,
     /// Google's names of the cause, such as `API_KEY_INVALID`.
@@ -81,7 +81,7 @@ const DAILY: [&str; 6] = ["(rpd)", "(tpd)", "perday", "per day", "per-day", "dai
 impl ApiError {
     /// Parses the error at the top level of a body: `error` as an object or text, or the flat shapes of vLLM, FastAPI and
     /// problem+json. `None` if the body has no error.
-    pub(in crate::ask) fn from_json(body: &Value) -> Option<Self> {
+    pub(crate) fn from_json(body: &Value) -> Option<Self> {
         // Gemini sends a list of one error.
         if let Value::Array(items) = body {
             return items.first().and_then(Self::from_json);
@@ -102,19 +102,19 @@ impl ApiError {
     }
 
     /// Parses the error in the field `error`; flat shapes are ignored.
-    pub(in crate::ask) fn in_error(body: &Value) -> Option<Self> {
+    pub(crate) fn in_error(body: &Value) -> Option<Self> {
         body.get("error")
             .filter(|error| is_filled(error))
             .map(Self::from_error)
     }
 
     /// Parses an error by its structure: an object with an error code and words, under any name.
-    pub(in crate::ask) fn in_structure(body: &Value) -> Option<Self> {
+    pub(crate) fn in_structure(body: &Value) -> Option<Self> {
         find_error(body).as_ref().map(Self::from_error)
     }
 
     /// Parses the value of a field `error`.
-    pub(in crate::ask) fn from_error(error: &Value) -> Self {
+    pub(crate) fn from_error(error: &Value) -> Self {
         Self::nested(error, MAX_DEPTH)
     }
 
@@ -192,7 +192,7 @@ impl ApiError {
     }
 
     /// Parses the body of a refused request: JSON, an HTML page or plain text.
-    pub(in crate::ask) fn from_body(body: &str) -> Self {
+    pub(crate) fn from_body(body: &str) -> Self {
         let parsed = parse(body).ok();
         if let Some(found) = parsed.as_ref().and_then(Self::from_json) {
             return found;
@@ -219,7 +219,7 @@ impl ApiError {
     }
 
     /// True if the code or the kind is one of these.
-    pub(in crate::ask) fn has_code(&self, codes: &[&str]) -> bool {
+    pub(crate) fn has_code(&self, codes: &[&str]) -> bool {
         [&self.code, &self.kind]
             .into_iter()
             .flatten()
@@ -227,7 +227,7 @@ impl ApiError {
     }
 
     /// True if the message contains one of these lower-case phrases, ignoring case.
-    pub(in crate::ask) fn mentions_any(&self, phrases: &[&str]) -> bool {
+    pub(crate) fn mentions_any(&self, phrases: &[&str]) -> bool {
         let message = self.message.to_lowercase();
         phrases.iter().any(|phrase| message.contains(phrase))
     }
@@ -273,7 +273,7 @@ impl ApiError {
     }
 
     /// The error code as an HTTP status; `None` unless it is a number from 400 to 599.
-    pub(in crate::ask) fn status(&self) -> Option<u16> {
+    pub(crate) fn status(&self) -> Option<u16> {
         let status = self.code.as_ref()?.parse().ok()?;
         (400..600).contains(&status).then_some(status)
     }
@@ -285,7 +285,7 @@ fn field(error: &Value, name: &str) -> Option<String> {
 
 /// Reason why a response with a success status has no reply.
 #[derive(Debug, PartialEq, Eq)]
-pub(in crate::ask) enum ReplyError {
+pub(crate) enum ReplyError {
     /// The body contains an error of the server.
     Api(Box<ApiError>),
     /// The body contains no reply in the form of the API.
@@ -294,20 +294,20 @@ pub(in crate::ask) enum ReplyError {
 
 /// A response body without a usable reply.
 #[derive(Debug, Default, PartialEq, Eq)]
-pub(in crate::ask) struct Unreadable {
+pub(crate) struct Unreadable {
     /// Description of the body, as a phrase that follows "answered with".
-    pub(in crate::ask) description: String,
+    pub(crate) description: String,
     /// Tokens charged for it; `None` if the server does not report them.
-    pub(in crate::ask) usage: Option<Usage>,
+    pub(crate) usage: Option<Usage>,
     /// Finish reason of the server, if it is unknown or means that the reply is incomplete.
-    pub(in crate::ask) finish: Option<String>,
+    pub(crate) finish: Option<String>,
     /// True if the body has a part of the reply, so that the server has worked on it.
-    pub(in crate::ask) broke_off: bool,
+    pub(crate) broke_off: bool,
 }
 
 impl Unreadable {
     /// A body with this description, without known charges.
-    pub(in crate::ask) fn new(description: impl Into<String>) -> Self {
+    pub(crate) fn new(description: impl Into<String>) -> Self {
         Self {
             description: description.into(),
             ..Self::default()
@@ -315,7 +315,7 @@ impl Unreadable {
     }
 
     /// The same body with the tokens charged for it.
-    pub(in crate::ask) fn with_usage(self, usage: Option<Usage>) -> Self {
+    pub(crate) fn with_usage(self, usage: Option<Usage>) -> Self {
         Self { usage, ..self }
     }
 }
@@ -333,7 +333,7 @@ fn truncated(mut message: String) -> String {
 }
 
 /// Describes an HTML page by its title; `None` if the body is not an HTML page.
-pub(in crate::ask) fn page_title(body: &str) -> Option<String> {
+pub(crate) fn page_title(body: &str) -> Option<String> {
     // ASCII lower case keeps byte positions.
     let lower = body.trim_start().to_ascii_lowercase();
     let is_page = lower.starts_with("<!doctype html") || lower.starts_with("<html");

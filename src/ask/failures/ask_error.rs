@@ -51,7 +51,7 @@ impl Refusal {
     const CAUSE_WORDS: usize = 6;
 
     /// The refusal with this status, code and words.
-    pub(in crate::ask) fn new(status: u16, code: Option<&str>, words: String) -> Self {
+    pub(crate) fn new(status: u16, code: Option<&str>, words: String) -> Self {
         // Some servers repeat the status as the code.
         let code = code.filter(|code| *code != status.to_string());
         let cause = code.map_or_else(
@@ -155,13 +155,13 @@ impl AskError {
     }
 
     /// Adds a charged attempt with these tokens.
-    pub(in crate::ask) fn with_charge(mut self, usage: Option<Usage>) -> Self {
+    pub(crate) fn with_charge(mut self, usage: Option<Usage>) -> Self {
         self.lost.add(usage);
         self
     }
 
     /// The same failure of a request on which the server may have worked.
-    pub(in crate::ask) fn with_unfinished(mut self, unfinished: Unfinished) -> Self {
+    pub(crate) fn with_unfinished(mut self, unfinished: Unfinished) -> Self {
         if unfinished.is_timeout() {
             self.failure.kind = FailureKind::Timeout;
             self.may_have_effect = true;
@@ -171,7 +171,7 @@ impl AskError {
     }
 
     /// Charge for the request.
-    pub(in crate::ask) fn charge(&self) -> Charge {
+    pub(crate) fn charge(&self) -> Charge {
         match *self.lost {
             lost if lost.attempts > 0 => Charge::Stated(lost.usage),
             _ if self.may_have_effect => Charge::Unknown,
@@ -180,7 +180,7 @@ impl AskError {
     }
 
     /// Turns the error of the last request into the error of the question, with all its attempts and charges.
-    pub(in crate::ask) fn with_attempts(self, attempts: u32, lost: LostAttempts) -> Self {
+    pub(crate) fn with_attempts(self, attempts: u32, lost: LostAttempts) -> Self {
         Self {
             attempts,
             lost: Box::new(lost),
@@ -190,7 +190,7 @@ impl AskError {
 
     /// True if a refusal with this status may concern the content of the request alone: moderation rejected it, or neither the server's
     /// words nor the size of the request explain it. The message must still be the remedy alone.
-    pub(in crate::ask) fn may_be_content(&self, status: u16) -> bool {
+    pub(crate) fn may_be_content(&self, status: u16) -> bool {
         let is_unexplained = match self.reach {
             Reach::Trial => self.failure.message.is_empty(),
             Reach::ByStatus => true,

@@ -6,7 +6,7 @@ use super::vocabulary;
 
 /// The HTTP status that an error implies which came with a success status: its code, or what its words mean. Without either it is a
 /// failure of the server, which may pass.
-pub(in crate::ask) fn implied_status(api_error: &ApiError) -> u16 {
+pub(crate) fn implied_status(api_error: &ApiError) -> u16 {
     if let Some(status) = api_error.status() {
         return status;
     }

@@ -74,7 +74,7 @@ const USED_UP: [&str; 4] = [
 
 /// True if moderation rejected the content of a request, as opposed to its key or its fields: the same request is rejected again.
 /// Statuses of a key, a proxy and a rate are not about content, whatever the words.
-pub(in crate::ask) fn is_moderated(status: u16, api_error: &ApiError) -> bool {
+pub(crate) fn is_moderated(status: u16, api_error: &ApiError) -> bool {
     let may_be_content = (400..500).contains(&status) && !matches!(status, 401 | 407 | 429);
     let is_stated = || {
         api_error.is_moderated
@@ -87,7 +87,7 @@ pub(in crate::ask) fn is_moderated(status: u16, api_error: &ApiError) -> bool {
 
 /// True if the server generated up to the token limit and sent an error instead of the truncated reply (Azure: "Could not finish the
 /// message because max_tokens or model output limit was reached").
-pub(in crate::ask) fn is_out_of_tokens(status: u16, api_error: &ApiError) -> bool {
+pub(crate) fn is_out_of_tokens(status: u16, api_error: &ApiError) -> bool {
     (400..500).contains(&status)
         && api_error.mentions_any(&LIMITS)
         && api_error.mentions_any(&USED_UP)

@@ -14,7 +14,7 @@ pub(crate) struct QuotaRefusal {
 
 impl QuotaRefusal {
     /// Recognizes such a refusal; `None` for other errors.
-    pub(in crate::ask) fn from_api_error(api_error: &ApiError, scrub: &Scrub) -> Option<Self> {
+    pub(crate) fn from_api_error(api_error: &ApiError, scrub: &Scrub) -> Option<Self> {
         let is_quota = api_error.has_code(&["token_limit_exceeded"])
             || api_error.mentions_any(&["enqueued token"]);
         is_quota.then(|| Self {

@@ -85,7 +85,7 @@ static NO_MODEL: LazyLock<Regex> = LazyLock::new(|| {
 
 impl AskError {
     /// Classifies a refused request by its status and the server's error. The message is only the remedy; empty if none is known.
-    pub(in crate::ask) fn refused(
+    pub(crate) fn refused(
         status: u16,
         api_error: &ApiError,
         wire: Wire,

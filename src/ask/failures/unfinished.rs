@@ -11,7 +11,7 @@ const LONG_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Minimum time after which a page of a gateway, or a lost connection, means that a time limit was reached; chosen: the limits of gateways
 /// that state no timeout are 30 s and more.
-pub(in crate::ask) const LONG_SILENCE: Duration = Duration::from_secs(25);
+pub(crate) const LONG_SILENCE: Duration = Duration::from_secs(25);
 
 /// Phrases for a reached time limit, in lower case.
 const TIMEOUT: [&str; 6] = [
@@ -41,7 +41,7 @@ pub(crate) enum Unfinished {
 
 impl Unfinished {
     /// The work on a request that was refused with this status and body after this time.
-    pub(in crate::ask) fn of_refusal(
+    pub(crate) fn of_refusal(
         status: u16,
         took: Duration,
         api_error: &ApiError,
@@ -62,12 +62,12 @@ impl Unfinished {
     }
 
     /// True if the request takes longer than a gateway waits.
-    pub(in crate::ask) fn is_timeout(self) -> bool {
+    pub(crate) fn is_timeout(self) -> bool {
         matches!(self, Self::RepeatedTimeout | Self::GatewayTimeout)
     }
 
     /// True if the server has probably charged the request.
-    pub(in crate::ask) fn is_probably_charged(self) -> bool {
+    pub(crate) fn is_probably_charged(self) -> bool {
         self == Self::BrokeOff || self.is_timeout()
     }
 }

@@ -10,7 +10,7 @@ use super::ask_error::Reach;
 /// A cause of refused requests, with the text patterns that indicate it.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(in crate::ask) struct Wording {
+pub(crate) struct Wording {
     cause: String,
     remedy: String,
     reach: WordingReach,
@@ -40,7 +40,7 @@ static WORDINGS: LazyLock<Wordings> =
 
 impl Wording {
     /// Finds the cause of an error; `None` if the table does not have it.
-    pub(in crate::ask) fn find(api_error: &ApiError, has_image: bool) -> Option<&'static Self> {
+    pub(crate) fn find(api_error: &ApiError, has_image: bool) -> Option<&'static Self> {
         let texts = api_error.lower_case_texts();
         WORDINGS.wording.iter().find(|wording| {
             (has_image || !wording.images)

@@ -20,7 +20,7 @@ const NEWEST_WEIGHT: f64 = 0.1;
 ///
 /// Each request waits for the user's quota, the endpoint's pauses, the learned rate and the reported limits.
 #[derive(Debug)]
-pub(in crate::ask) struct Gate {
+pub(crate) struct Gate {
     state: Mutex<State>,
     /// Locked by the request whose turn is next; the others queue for the lock.
     queue: tokio::sync::Mutex<()>,
@@ -45,7 +45,7 @@ struct State {
 }
 
 impl Gate {
-    pub(in crate::ask) fn new(quota: Quota) -> Self {
+    pub(crate) fn new(quota: Quota) -> Self {
         let now = Instant::now();
         Self {
             state: Mutex::new(State {
@@ -63,7 +63,7 @@ impl Gate {
     }
 
     /// Waits until the request may be sent; returns the send time.
-    pub(in crate::ask) async fn pass(&self) -> Instant {
+    pub(crate) async fn pass(&self) -> Instant {
         let _turn = self.queue.lock().await;
         loop {
             let now = Instant::now();
@@ -83,19 +83,19 @@ impl Gate {
     }
 
     /// Earliest send time of a new request, ignoring the requests in the queue.
-    pub(in crate::ask) fn ready_at(&self) -> Instant {
+    pub(crate) fn ready_at(&self) -> Instant {
         let now = Instant::now();
         let mut state = self.state();
         state.next_turn(now).0.max(now)
     }
 
     /// Time for which the first request of the queue had to wait so far.
-    pub(in crate::ask) fn held_back(&self) -> HeldBack {
+    pub(crate) fn held_back(&self) -> HeldBack {
         self.state().held_back
     }
 
     /// Pauses all requests, because the endpoint has no capacity. The learned rate does not change.
-    pub(in crate::ask) fn pause(&self, wait: Duration) {
+    pub(crate) fn pause(&self, wait: Duration) {
         let now = Instant::now();
         let mut state = self.state();
         state.refused_since.get_or_insert(now);
@@ -103,7 +103,7 @@ impl Gate {
     }
 
     /// Records that the request sent at `sent` was rate limited; `wait` is the wait that the endpoint asked for.
-    pub(in crate::ask) fn record_rate_limited(&self, sent: Instant, wait: Option<Duration>) {
+    pub(crate) fn record_rate_limited(&self, sent: Instant, wait: Option<Duration>) {
         let now = Instant::now();
         let mut state = self.state();
         state.refused_since.get_or_insert(now);
@@ -111,7 +111,7 @@ impl Gate {
     }
 
     /// Time since the first refusal after the last success; zero without a refusal.
-    pub(in crate::ask) fn refused_for(&self) -> Duration {
+    pub(crate) fn refused_for(&self) -> Duration {
         let since = self.state().refused_since;
         since.map_or(Duration::ZERO, |since| since.elapsed())
     }
@@ -119,7 +119,7 @@ impl Gate {
     /// Records the success of the request sent at `sent`: its tokens, and the limits that the response reports.
     ///
     /// A reported pause longer than `max_wait` is ignored.
-    pub(in crate::ask) fn record_success(
+    pub(crate) fn record_success(
         &self,
         sent: Instant,
         tokens: Option<u64>,

@@ -22,7 +22,7 @@ struct RateLimit {
 
 /// Rate limits on requests and on tokens; `None` if the server does not report them.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(in crate::ask) struct RateLimits {
+pub(crate) struct RateLimits {
     requests: Option<RateLimit>,
     tokens: Option<RateLimit>,
 }
@@ -41,7 +41,7 @@ impl RateLimits {
     /// Reads the response headers `x-ratelimit-{limit,remaining,reset}-{requests,tokens}` (OpenAI and compatible servers),
     /// `x-ratelimit-{limit,remaining,reset}` (OpenRouter, for requests) and
     /// `anthropic-ratelimit-{requests,tokens}-{limit,remaining,reset}`. A limit without `remaining` or `reset` is ignored.
-    pub(in crate::ask) fn read(headers: &HeaderMap, now: SystemTime) -> Self {
+    pub(crate) fn read(headers: &HeaderMap, now: SystemTime) -> Self {
         let limit_on = |kind: &str| {
             rate_limit(headers, now, &|field| format!("x-ratelimit-{field}-{kind}")).or_else(|| {
                 rate_limit(headers, now, &|field| {
@@ -57,7 +57,7 @@ impl RateLimits {
     }
 
     /// Time until every exhausted limit has reset; `None` if no limit is exhausted.
-    pub(in crate::ask) fn pause(&self) -> Option<Duration> {
+    pub(crate) fn pause(&self) -> Option<Duration> {
         [self.requests, self.tokens]
             .into_iter()
             .flatten()

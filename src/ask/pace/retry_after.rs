@@ -8,7 +8,7 @@ use reqwest::header::{DATE, HeaderMap, RETRY_AFTER};
 ///
 /// `Retry-After` is a number of seconds, possibly with a fraction, or a date. A date is relative to the server's clock if the response
 /// has a `Date`. `None` without a valid header, or for a wait of zero.
-pub(in crate::ask) fn retry_after(headers: &HeaderMap, now: SystemTime) -> Option<Duration> {
+pub(crate) fn retry_after(headers: &HeaderMap, now: SystemTime) -> Option<Duration> {
     if let Some(wait) = header(headers, "retry-after-ms").and_then(|ms| parse_duration(ms, 1e-3)) {
         return Some(wait);
     }

@@ -89,7 +89,7 @@ fn compiled(pattern: &str) -> Regex {
 /// Returns the longest wait stated in a text, such as “Please try again in 7m12s.”
 ///
 /// Only sentences with one of [`WAIT_PHRASES`] are searched. `None` if no wait is found.
-pub(in crate::ask) fn wait_in_words(text: &str) -> Option<Duration> {
+pub(crate) fn wait_in_words(text: &str) -> Option<Duration> {
     wait_in_words_at(text, Timestamp::now())
 }
 
@@ -149,7 +149,7 @@ fn wait_in_sentence(sentence: &str, now: Timestamp) -> Option<Duration> {
 
 /// Wait in a field of an error or a header embedded in it, by its name: `retry_after`, `retryAfterMs`, `estimated_time`, `reset_at`. A value
 /// is a number of seconds (milliseconds if the name ends so), a duration or a moment. `None` for other fields and without a wait.
-pub(in crate::ask) fn wait_in_field(name: &str, value: &str) -> Option<Duration> {
+pub(crate) fn wait_in_field(name: &str, value: &str) -> Option<Duration> {
     wait_in_field_at(name, value, Timestamp::now())
 }
 

@@ -26,7 +26,7 @@ impl ConcurrencyBounds {
     /// Bounds for each of `count` replicas, so that these bounds apply to all replicas together, with at least one request each. The
     /// default bounds are not divided: each replica gets them whole.
     #[must_use]
-    pub(in crate::ask) fn per_replica(self, count: usize) -> Self {
+    pub(crate) fn per_replica(self, count: usize) -> Self {
         if self == Self::DEFAULT {
             return self;
         }
@@ -92,7 +92,7 @@ const QUEUEING_RATIO: f64 = 1.5;
 /// Each round of successes widens it by one request while replies do not get slower. An overload (429, 503, 529, a timeout)
 /// narrows it by 30 %, once for all requests in flight at that time.
 #[derive(Debug)]
-pub(in crate::ask) struct Window {
+pub(crate) struct Window {
     bounds: ConcurrencyBounds,
     state: Mutex<State>,
 }
@@ -113,7 +113,7 @@ struct State {
 }
 
 impl Window {
-    pub(in crate::ask) fn new(bounds: ConcurrencyBounds) -> Self {
+    pub(crate) fn new(bounds: ConcurrencyBounds) -> Self {
         Self {
             bounds,
             state: Mutex::new(State {
@@ -128,12 +128,12 @@ impl Window {
     }
 
     /// Maximum number of requests in flight at the moment.
-    pub(in crate::ask) fn width(&self) -> usize {
+    pub(crate) fn width(&self) -> usize {
         self.state().width as usize
     }
 
     /// Records a reply and its duration.
-    pub(in crate::ask) fn record_success(&self, duration: Duration) {
+    pub(crate) fn record_success(&self, duration: Duration) {
         let mut state = self.state();
         state.replies += 1;
         state.reply_time += duration;
@@ -152,7 +152,7 @@ impl Window {
     }
 
     /// Records that the request sent at `sent` overloaded the server.
-    pub(in crate::ask) fn record_overload(&self, sent: Instant) {
+    pub(crate) fn record_overload(&self, sent: Instant) {
         let mut state = self.state();
         if state.decreased_at.is_none_or(|decreased| sent > decreased) {
             state.decreased_at = Some(Instant::now());

@@ -9,7 +9,7 @@ const NON_NUMBERS: [&[u8]; 3] = [b"NaN", b"Infinity", b"-Infinity"];
 /// Servers that cut a reply inside an emoji send unpaired surrogates. The grammar of JSON allows them (RFC 8259, section 8.2), but a
 /// Rust string cannot contain them. Servers in Python send log probabilities that are no numbers. Without the repair, a paid reply would be
 /// lost.
-pub(in crate::ask) fn repaired(json: &str) -> Option<String> {
+pub(crate) fn repaired(json: &str) -> Option<String> {
     let bytes = json.as_bytes();
     let mut text = String::new();
     // Bytes before `copied_to` are in `text` already.

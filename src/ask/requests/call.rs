@@ -41,7 +41,7 @@ impl<'a> Query<'a> {
     ///
     /// # Errors
     /// If the question is open.
-    pub(in crate::ask) fn require_choices(self) -> Result<&'a Question, AskError> {
+    pub(crate) fn require_choices(self) -> Result<&'a Question, AskError> {
         match self {
             Self::Choice(question) => Ok(question),
             Self::Open(id) => {
@@ -71,7 +71,7 @@ pub enum ImagePlaces {
 
 /// Part of a message.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::ask) enum MessagePart<'a> {
+pub(crate) enum MessagePart<'a> {
     /// Text; not empty.
     Text(&'a str),
     Image(&'a Arc<Payload>),
@@ -103,7 +103,7 @@ impl<'a> Message<'a> {
     }
 
     /// Parts of the message, in order.
-    pub(in crate::ask) fn parts(&self) -> Vec<MessagePart<'a>> {
+    pub(crate) fn parts(&self) -> Vec<MessagePart<'a>> {
         let mut is_placed = vec![false; self.images.len()];
         let before = self.text_parts(self.before, &mut is_placed);
         let after = self.text_parts(self.after, &mut is_placed);
@@ -134,7 +134,7 @@ impl<'a> Message<'a> {
 }
 
 /// Images among the parts of a message, in order.
-pub(in crate::ask) fn images<'a>(
+pub(crate) fn images<'a>(
     parts: &[MessagePart<'a>],
 ) -> impl Iterator<Item = &'a Arc<Payload>> + Clone {
     parts.iter().filter_map(|part| match part {

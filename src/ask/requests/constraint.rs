@@ -6,10 +6,10 @@ use super::parameters::Constrain;
 use crate::types::questions::letter;
 
 /// Name of the only field in a reply with `--request constrain=json`.
-pub(in crate::ask) const ANSWER: &str = "answer";
+pub(crate) const ANSWER: &str = "answer";
 
 /// JSON schema of an object whose only field is one of the letters.
-pub(in crate::ask) fn schema(letters: &[char]) -> Value {
+pub(crate) fn schema(letters: &[char]) -> Value {
     json!({
         "type": "object", "additionalProperties": false, "required": [ANSWER],
         "properties": {ANSWER: {"type": "string", "enum": letters}},
@@ -17,7 +17,7 @@ pub(in crate::ask) fn schema(letters: &[char]) -> Value {
 }
 
 /// Letter in a constrained reply; `None` without a constraint, or if the server did not follow it.
-pub(in crate::ask) fn constrained_letter(
+pub(crate) fn constrained_letter(
     constrain: Constrain,
     choices: usize,
     reply: &str,

@@ -173,30 +173,30 @@ fn parse_body(value: &str) -> Result<Map<String, Value>> {
 
 impl ExtraFields {
     /// True if the user adds this top-level field.
-    pub(in crate::ask) fn adds(&self, field: &str) -> bool {
+    pub(crate) fn adds(&self, field: &str) -> bool {
         self.body.contains_key(field)
     }
 
     /// True if the user adds this field to a top-level object.
-    pub(in crate::ask) fn adds_below(&self, object: &str, field: &str) -> bool {
+    pub(crate) fn adds_below(&self, object: &str, field: &str) -> bool {
         let object = self.body.get(object).and_then(Value::as_object);
         object.is_some_and(|object| object.contains_key(field))
     }
 
     /// Service tier that requests ask for; `None` if they leave it to the server.
-    pub(in crate::ask) fn service_tier(&self) -> Option<&str> {
+    pub(crate) fn service_tier(&self) -> Option<&str> {
         self.body.get("service_tier")?.as_str()
     }
 
     /// True if a field that limits the tokens of a reply is omitted.
-    pub(in crate::ask) fn omits_token_limit(&self) -> bool {
+    pub(crate) fn omits_token_limit(&self) -> bool {
         self.omit
             .iter()
             .any(|field| TOKEN_LIMITS.contains(&&**field))
     }
 
     /// Limit of thinking tokens in the added fields, at any depth; `None` without one.
-    pub(in crate::ask) fn thinking_budget(&self) -> Option<ThinkingBudget> {
+    pub(crate) fn thinking_budget(&self) -> Option<ThinkingBudget> {
         find_thinking_budget(&self.body)
     }
 
@@ -207,7 +207,7 @@ impl ExtraFields {
     ///
     /// # Errors
     /// If the body is not a JSON object.
-    pub(in crate::ask) fn apply(&self, json: String) -> Result<String, serde_json::Error> {
+    pub(crate) fn apply(&self, json: String) -> Result<String, serde_json::Error> {
         if self.body.is_empty() && self.omit.is_empty() {
             return Ok(json);
         }
@@ -222,7 +222,7 @@ impl ExtraFields {
 
 /// Limit on the tokens that a model may spend on thinking.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::ask) enum ThinkingBudget {
+pub(crate) enum ThinkingBudget {
     Tokens(u64),
     /// No limit: a negative number, by Google's convention.
     Unlimited,

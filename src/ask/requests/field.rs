@@ -36,21 +36,21 @@ pub enum AdaptableField {
 
 /// Values of the adaptable fields. They are the same for all requests of a run, except after a refusal.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::ask) struct RequestFields {
+pub(crate) struct RequestFields {
     /// The API.
-    pub(in crate::ask) wire: Wire,
+    pub(crate) wire: Wire,
     /// Name of the token limit; never `Auto`.
-    pub(in crate::ask) token_field: TokenField,
+    pub(crate) token_field: TokenField,
     /// Temperature; `None` to send none.
-    pub(in crate::ask) temperature: Option<f64>,
+    pub(crate) temperature: Option<f64>,
     /// Seed of the sampling; `None` to send none.
-    pub(in crate::ask) seed: Option<u64>,
+    pub(crate) seed: Option<u64>,
     /// True to request token counts in a stream.
-    pub(in crate::ask) stream_usage: bool,
+    pub(crate) stream_usage: bool,
     /// Number of top tokens whose probabilities are requested; `None` to request none.
-    pub(in crate::ask) top_logprobs: Option<u8>,
+    pub(crate) top_logprobs: Option<u8>,
     /// Switch that turns thinking on or off; `None` to send none.
-    pub(in crate::ask) thinking: Option<&'static ThinkingSwitch>,
+    pub(crate) thinking: Option<&'static ThinkingSwitch>,
 }
 
 /// Maximum number of top tokens of OpenAI's API and most other servers.
@@ -64,7 +64,7 @@ impl RequestFields {
     ///
     /// # Errors
     /// If the server has no known switch for `--thinking`, or if the switch is the reasoning effort and `--reasoning-effort` is also set.
-    pub(in crate::ask) fn initial(
+    pub(crate) fn initial(
         parameters: &Parameters,
         base: &BaseUrl,
         vendor: Option<&Vendor>,
@@ -94,7 +94,7 @@ impl RequestFields {
     }
 
     /// Reasoning effort: from the user, or from the switch for thinking.
-    pub(in crate::ask) fn effort<'p>(&self, parameters: &'p Parameters) -> Option<&'p str> {
+    pub(crate) fn effort<'p>(&self, parameters: &'p Parameters) -> Option<&'p str> {
         parameters
             .reasoning_effort
             .as_deref()
@@ -102,12 +102,12 @@ impl RequestFields {
     }
 
     /// Body fields of the switch for thinking.
-    pub(in crate::ask) fn thinking_body(&self) -> Option<&'static Map<String, Value>> {
+    pub(crate) fn thinking_body(&self) -> Option<&'static Map<String, Value>> {
         self.thinking.map(|switch| &switch.body)
     }
 
     /// Body fields of the switch for thinking, as fields that a server may refuse.
-    pub(in crate::ask) fn thinking_fields<'a>(self) -> impl Iterator<Item = RequestField<'a>> {
+    pub(crate) fn thinking_fields<'a>(self) -> impl Iterator<Item = RequestField<'a>> {
         self.thinking_body()
             .into_iter()
             .flat_map(Map::keys)
@@ -121,7 +121,7 @@ impl RequestFields {
 
     /// Adapts the fields after the refusal of one of them; `None` if the user set the field, or if no other way is left. A token limit is
     /// first sent under its other name and then omitted.
-    pub(in crate::ask) fn after_refusal(
+    pub(crate) fn after_refusal(
         self,
         field: AdaptableField,
         initial: Self,
@@ -179,7 +179,7 @@ impl RequestFields {
     }
 
     /// True if a field differs from the `initial` fields.
-    pub(in crate::ask) fn differs(self, field: AdaptableField, initial: Self) -> bool {
+    pub(crate) fn differs(self, field: AdaptableField, initial: Self) -> bool {
         match field {
             AdaptableField::Wire(_) => self.wire != initial.wire,
             AdaptableField::TokenField => self.token_field != initial.token_field,
@@ -193,7 +193,7 @@ impl RequestFields {
     }
 
     /// Differences from the `initial` fields, as phrases for messages.
-    pub(in crate::ask) fn changes(self, initial: Self) -> Vec<String> {
+    pub(crate) fn changes(self, initial: Self) -> Vec<String> {
         let wire = match self.wire {
             wire if wire == initial.wire => None,
             Wire::Responses => Some("it is asked through the Responses API".to_owned()),
@@ -229,16 +229,16 @@ impl RequestFields {
 
 /// Content of a request, for the analysis of a refusal.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::ask) struct SentFields<'a> {
-    pub(in crate::ask) parameters: &'a Parameters,
-    pub(in crate::ask) fields: RequestFields,
-    pub(in crate::ask) has_image: bool,
-    pub(in crate::ask) has_key: bool,
+pub(crate) struct SentFields<'a> {
+    pub(crate) parameters: &'a Parameters,
+    pub(crate) fields: RequestFields,
+    pub(crate) has_image: bool,
+    pub(crate) has_key: bool,
 }
 
 impl<'a> SentFields<'a> {
     /// Flags of the fields sent that not all providers take, those of the user first.
-    pub(in crate::ask) fn optional_flags(self) -> Vec<String> {
+    pub(crate) fn optional_flags(self) -> Vec<String> {
         let parameters = self.parameters;
         let extra: Vec<&str> = parameters.extra.body.keys().map(String::as_str).collect();
         let flags = [
@@ -278,7 +278,7 @@ impl<'a> SentFields<'a> {
     }
 
     /// Fields that the user adds: the system message and `--extra-body`.
-    pub(in crate::ask) fn user_fields(self) -> impl Iterator<Item = RequestField<'a>> {
+    pub(crate) fn user_fields(self) -> impl Iterator<Item = RequestField<'a>> {
         let extra = &self.parameters.extra;
         let body_fields = extra.body.keys().map(|name| RequestField {
             name,
@@ -328,7 +328,7 @@ const UNSUPPORTED: [&str; 24] = [
 
 /// Presence of a field in a request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::ask) enum FieldState {
+pub(crate) enum FieldState {
     /// The field is sent.
     Sent,
     /// The field is no longer sent, because the server refused it.
@@ -339,12 +339,12 @@ pub(in crate::ask) enum FieldState {
 
 impl FieldState {
     /// State of a field that the program does not adapt.
-    pub(in crate::ask) fn sent_if(sent: bool) -> Self {
+    pub(crate) fn sent_if(sent: bool) -> Self {
         if sent { Self::Sent } else { Self::Absent }
     }
 
     /// State of an adaptable field. If it is not sent, either it was omitted from the start or the server has refused it.
-    pub(in crate::ask) fn until_refused(sent: bool, omitted: bool) -> Self {
+    pub(crate) fn until_refused(sent: bool, omitted: bool) -> Self {
         match (sent, omitted) {
             (true, _) => Self::Sent,
             (false, true) => Self::Absent,
@@ -358,19 +358,19 @@ const ORDINARY_WORDS: [&str; 5] = ["detail", "effort", "format", "reasoning", "s
 
 /// Field of a request, with the remedy if it is refused.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::ask) struct RequestField<'a> {
-    pub(in crate::ask) name: &'a str,
+pub(crate) struct RequestField<'a> {
+    pub(crate) name: &'a str,
     /// Presence in the request.
-    pub(in crate::ask) state: FieldState,
+    pub(crate) state: FieldState,
     /// Remedy for the user: the flag that changes the field.
-    pub(in crate::ask) hint: &'static str,
+    pub(crate) hint: &'static str,
     /// The adaptable field, if the program can send it in another way.
-    pub(in crate::ask) adaptable: Option<AdaptableField>,
+    pub(crate) adaptable: Option<AdaptableField>,
 }
 
 impl<'a> RequestField<'a> {
     /// The temperature or seed sent, if the error is about it and no other field: it mentions no other sent field.
-    pub(in crate::ask) fn subject<'f>(
+    pub(crate) fn subject<'f>(
         fields: &'f [RequestField<'a>],
         api_error: &ApiError,
     ) -> Option<&'f RequestField<'a>> {
@@ -396,7 +396,7 @@ impl<'a> RequestField<'a> {
     }
 
     /// Flags of the setting that decides the field, if a run may continue with another value after a refusal.
-    pub(in crate::ask) fn forced_flags(&self) -> &'static [&'static str] {
+    pub(crate) fn forced_flags(&self) -> &'static [&'static str] {
         match self.name {
             "temperature" => &["--temperature"],
             "seed" => &["--sampling-seed"],
@@ -407,7 +407,7 @@ impl<'a> RequestField<'a> {
     }
 
     /// True if the server names the field as the cause: in the `param` of the error, or in a message about an unsupported field.
-    pub(in crate::ask) fn is_named(&self, api_error: &ApiError) -> bool {
+    pub(crate) fn is_named(&self, api_error: &ApiError) -> bool {
         if self.is_param(api_error) {
             return true;
         }
@@ -416,7 +416,7 @@ impl<'a> RequestField<'a> {
     }
 
     /// True if the `param` of the error is the field, alone or at the end of a path.
-    pub(in crate::ask) fn is_param(&self, api_error: &ApiError) -> bool {
+    pub(crate) fn is_param(&self, api_error: &ApiError) -> bool {
         api_error
             .param
             .as_deref()
@@ -424,7 +424,7 @@ impl<'a> RequestField<'a> {
     }
 
     /// True if the error message mentions the field.
-    pub(in crate::ask) fn is_mentioned(&self, api_error: &ApiError) -> bool {
+    pub(crate) fn is_mentioned(&self, api_error: &ApiError) -> bool {
         mentions(&api_error.message.to_lowercase(), self.name)
     }
 
@@ -445,7 +445,7 @@ fn last_segment(path: &str) -> &str {
 }
 
 /// True if the error is about an unsupported field or value.
-pub(in crate::ask) fn is_unsupported(api_error: &ApiError) -> bool {
+pub(crate) fn is_unsupported(api_error: &ApiError) -> bool {
     let codes = [
         "unsupported_parameter",
         "unsupported_value",

@@ -11,7 +11,7 @@ const FLAGS: [(&str, &str); 6] = [
 ];
 
 /// Replaces the flags of models in a message by those of the judge.
-pub(in crate::ask) fn for_judge(message: &str) -> String {
+pub(crate) fn for_judge(message: &str) -> String {
     FLAGS
         .iter()
         .fold(message.to_owned(), |text, (flag, of_judge)| {

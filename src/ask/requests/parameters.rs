@@ -85,7 +85,7 @@ pub struct Parameters {
 
 impl Parameters {
     /// True if the model was told to think.
-    pub(in crate::ask) fn asks_to_think(&self) -> bool {
+    pub(crate) fn asks_to_think(&self) -> bool {
         let effort = self.reasoning_effort.as_deref();
         self.thinking == Some(Thinking::On) || effort.is_some_and(|effort| effort != "none")
     }
@@ -116,22 +116,22 @@ impl Parameters {
     }
 
     /// Token limit in requests; `None` to send none.
-    pub(in crate::ask) fn limit(&self) -> Option<u32> {
+    pub(crate) fn limit(&self) -> Option<u32> {
         (self.token_field != TokenField::Omit).then_some(self.max_tokens.get())
     }
 
     /// Token limit in requests, if the run began with another one.
-    pub(in crate::ask) fn changed_limit(&self) -> Option<u32> {
+    pub(crate) fn changed_limit(&self) -> Option<u32> {
         self.limit().filter(|_| self.first_max_tokens.is_some())
     }
 
     /// Token limit with which the run began.
-    pub(in crate::ask) fn first_limit(&self) -> u32 {
+    pub(crate) fn first_limit(&self) -> u32 {
         self.first_max_tokens.unwrap_or(self.max_tokens).get()
     }
 
     /// True if the user did not set the temperature.
-    pub(in crate::ask) fn is_default_temperature(&self) -> bool {
+    pub(crate) fn is_default_temperature(&self) -> bool {
         self.temperature == Temperature::Auto || self.origin.default_temperature
     }
 
@@ -199,7 +199,7 @@ impl Parameters {
     }
 
     /// Settings that can change a reply, including the API and the token limit, but not the name of its field.
-    pub(in crate::ask) fn content(&self) -> Value {
+    pub(crate) fn content(&self) -> Value {
         if let Some(first) = &self.origin.continued {
             return first.content.clone();
         }

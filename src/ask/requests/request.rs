@@ -10,28 +10,28 @@ use crate::ask::wire_kind::Wire;
 
 /// What follows if a gateway gives up on a request.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::ask) struct AfterTimeout {
+pub(crate) struct AfterTimeout {
     /// Number of earlier requests of the question that were charged, certainly or probably, and gave no reply that counts.
-    pub(in crate::ask) charged: u32,
+    pub(crate) charged: u32,
     /// True if the caller asks the question in another way, so that the request is not repeated.
-    pub(in crate::ask) asks_otherwise: bool,
+    pub(crate) asks_otherwise: bool,
     /// What the user can do, for the message.
-    pub(in crate::ask) remedy: &'static str,
+    pub(crate) remedy: &'static str,
 }
 
 /// One request, which may be sent several times.
-pub(in crate::ask) struct Request<'a> {
+pub(crate) struct Request<'a> {
     /// Index of the model at the endpoint.
-    pub(in crate::ask) model: ModelIndex,
-    pub(in crate::ask) wire: Wire,
+    pub(crate) model: ModelIndex,
+    pub(crate) wire: Wire,
     /// Headers for each replica.
-    pub(in crate::ask) headers: &'a [HeaderMap],
-    pub(in crate::ask) body: RequestBody,
-    pub(in crate::ask) sent: SentFields<'a>,
+    pub(crate) headers: &'a [HeaderMap],
+    pub(crate) body: RequestBody,
+    pub(crate) sent: SentFields<'a>,
     /// Hash of the images: requests about the same images prefer the same replica.
-    pub(in crate::ask) affinity: u64,
+    pub(crate) affinity: u64,
     /// Handling of gateway timeouts.
-    pub(in crate::ask) timeouts: AfterTimeout,
+    pub(crate) timeouts: AfterTimeout,
     /// Reservation of the cost of each attempt; `None` if the model has no known price.
-    pub(in crate::ask) reservation: Option<&'a Reservation>,
+    pub(crate) reservation: Option<&'a Reservation>,
 }

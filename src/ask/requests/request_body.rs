@@ -10,7 +10,7 @@ use hyper::body::{Body, Frame, SizeHint};
 
 /// A body of known length that is sent in chunks; cloning it copies no bytes.
 #[derive(Debug, Clone)]
-pub(in crate::ask) struct RequestBody {
+pub(crate) struct RequestBody {
     chunks: Arc<[Bytes]>,
     /// Index of the next chunk to send.
     next: usize,
@@ -18,13 +18,13 @@ pub(in crate::ask) struct RequestBody {
 
 impl RequestBody {
     /// Creates a body from its chunks. Empty chunks are not sent.
-    pub(in crate::ask) fn new(chunks: impl IntoIterator<Item = Bytes>) -> Self {
+    pub(crate) fn new(chunks: impl IntoIterator<Item = Bytes>) -> Self {
         let chunks = chunks.into_iter().collect();
         Self { chunks, next: 0 }
     }
 
     /// The whole body.
-    pub(in crate::ask) fn concat(&self) -> Vec<u8> {
+    pub(crate) fn concat(&self) -> Vec<u8> {
         self.chunks.concat()
     }
 

@@ -28,7 +28,7 @@ const STEP: u16 = 1;
 const MAX_BOUND: u16 = 200;
 
 /// Least temperature that a server accepts by its refusal of a lower one, in hundredths. `None` if the refusal states no range.
-pub(in crate::ask) fn least_temperature(message: &str) -> Option<u16> {
+pub(crate) fn least_temperature(message: &str) -> Option<u16> {
     let lower = message.to_lowercase();
     // Only one temperature is accepted: the server's own.
     if lower.contains("only") {

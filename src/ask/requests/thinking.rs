@@ -56,7 +56,7 @@ struct ServerRow {
 /// Request fields that turn thinking on or off.
 #[derive(Debug, PartialEq, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(in crate::ask) struct ThinkingSwitch {
+pub(crate) struct ThinkingSwitch {
     /// Reasoning effort; `None` if the switch does not use it.
     pub(super) effort: Option<String>,
     /// Top-level fields of the body.

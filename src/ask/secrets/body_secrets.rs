@@ -26,7 +26,7 @@ const MIN_LENGTH: usize = 20;
 ///
 /// # Errors
 /// [`Error::Usage`] with the name of a field that looks like a secret, without its value.
-pub(in crate::ask) fn refuse_secrets(fields: &Map<String, Value>) -> Result<()> {
+pub(crate) fn refuse_secrets(fields: &Map<String, Value>) -> Result<()> {
     fields
         .iter()
         .try_for_each(|(name, value)| refuse_in_field(name, value))

@@ -10,11 +10,7 @@ use crate::error::{Error, Result};
 ///
 /// # Errors
 /// If the key belongs to another vendor. The error names the vendor and the address, but never the key.
-pub(in crate::ask) fn check_owner(
-    key: &Secret,
-    base: &BaseUrl,
-    vendors: VendorTable,
-) -> Result<()> {
+pub(crate) fn check_owner(key: &Secret, base: &BaseUrl, vendors: VendorTable) -> Result<()> {
     match vendors.by_key(key.expose()) {
         Some(owner) if !base.is_loopback() && !owner.owns_host(base.host()) => Err(Error::usage(
             "--base-url",

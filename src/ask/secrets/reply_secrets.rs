@@ -13,7 +13,7 @@ const MAX_NOTE: usize = 64;
 const MAX_NAME: usize = 200;
 
 /// Removes keys that a server or a model repeats in a reply, and limits the length of its texts.
-pub(in crate::ask) fn without_secrets(reply: Reply, scrub: &Scrub) -> Reply {
+pub(crate) fn without_secrets(reply: Reply, scrub: &Scrub) -> Reply {
     let name = |mut name: String| {
         name = scrub.reply(name);
         name.truncate(name.floor_char_boundary(MAX_NAME));

@@ -49,7 +49,7 @@ impl Secret {
     /// # Errors
     /// If the file cannot be read, or is not a single line of visible ASCII, such as a file named by mistake. The error shows neither its
     /// content nor a key in place of the path.
-    pub(in crate::ask) fn read(path: &Path) -> Result<Self> {
+    pub(crate) fn read(path: &Path) -> Result<Self> {
         let bytes = reading::at_most(path, MAX_FILE).map_err(|error| {
             if path.to_str().is_some_and(is_key_in_place_of_file) {
                 Error::usage(
@@ -71,7 +71,7 @@ impl Secret {
     }
 
     /// The key as plain text, for HTTP headers.
-    pub(in crate::ask) fn expose(&self) -> &str {
+    pub(crate) fn expose(&self) -> &str {
         &self.0
     }
 }
@@ -98,7 +98,7 @@ const MIN_SECRET_IN_REPLY: usize = 16;
 
 /// Filter that makes the text of a server safe for terminals, logs and tables: removes secrets and control characters, and shortens it.
 #[derive(Clone, Default)]
-pub(in crate::ask) struct Scrub {
+pub(crate) struct Scrub {
     /// Secrets, longest first: if one secret contains another, no part of the longer one must remain.
     secrets: Vec<String>,
     /// Parts of the secrets that are long enough for [`MIN_SECRET_IN_REPLY`].
@@ -107,7 +107,7 @@ pub(in crate::ask) struct Scrub {
 
 impl Scrub {
     /// Creates a filter for these secrets.
-    pub(in crate::ask) fn new(secrets: impl IntoIterator<Item = String>) -> Self {
+    pub(crate) fn new(secrets: impl IntoIterator<Item = String>) -> Self {
         let mut secrets: Vec<String> = secrets
             .into_iter()
             .filter(|secret| secret.len() >= MIN_SECRET)
@@ -119,12 +119,12 @@ impl Scrub {
     }
 
     /// This filter, which also removes another secret.
-    pub(in crate::ask) fn with(&self, secret: String) -> Self {
+    pub(crate) fn with(&self, secret: String) -> Self {
         Self::new(self.secrets.iter().cloned().chain([secret]))
     }
 
     /// True if there are no secrets to remove.
-    pub(in crate::ask) fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.secrets.is_empty()
     }
 
@@ -134,7 +134,7 @@ impl Scrub {
     }
 
     /// Removes keys from a line of JSON. Each string is filtered alone. Ids of requests in a batch are not searched for parts of keys.
-    pub(in crate::ask) fn json_line(&self, line: String) -> String {
+    pub(crate) fn json_line(&self, line: String) -> String {
         let line = self.without_whole_keys(line);
         let parts: Vec<&str> = line.split('"').collect();
         parts
@@ -164,7 +164,7 @@ impl Scrub {
     }
 
     /// Puts a text on one line of at most 300 characters, without secrets and hidden characters.
-    pub(in crate::ask) fn line(&self, text: &str) -> String {
+    pub(crate) fn line(&self, text: &str) -> String {
         let text = &text[..text.floor_char_boundary(MAX_READ)];
         let visible: String = text.chars().filter(|c| !is_hidden(*c)).collect();
         let words: Vec<&str> = visible.split_whitespace().collect();

@@ -20,7 +20,7 @@ pub struct Vendor {
     /// Host name suffixes of its endpoints, such as `api.example.com` or `.example.com`.
     hosts: Vec<String>,
     /// Environment variables in which the vendor's own tools look for a key, in this order.
-    pub(in crate::ask) key: Vec<String>,
+    pub(crate) key: Vec<String>,
     /// Patterns of keys that only this vendor uses, with `*` for any text; empty if there are none.
     #[serde(default)]
     key_form: Vec<String>,
@@ -32,28 +32,28 @@ pub struct Vendor {
     token_field: LimitField,
     /// True if reasoning tokens do not count toward the token limit.
     #[serde(default)]
-    pub(in crate::ask) thinks_beyond_limit: bool,
+    pub(crate) thinks_beyond_limit: bool,
     /// Maximum size of an image file, in bytes.
-    pub(in crate::ask) image_bytes: Option<usize>,
+    pub(crate) image_bytes: Option<usize>,
     /// Maximum side of an image, in pixels.
-    pub(in crate::ask) image_side: Option<u32>,
+    pub(crate) image_side: Option<u32>,
     /// Maximum number of images in a request.
-    pub(in crate::ask) images: Option<usize>,
+    pub(crate) images: Option<usize>,
     /// Maximum side of an image, in pixels, if a request has more than 20 images.
-    pub(in crate::ask) image_side_many: Option<u32>,
+    pub(crate) image_side_many: Option<u32>,
     /// Maximum size of a request body, in bytes.
-    pub(in crate::ask) request_bytes: Option<usize>,
+    pub(crate) request_bytes: Option<usize>,
     /// Why replies lack token probabilities; `None` if some models return them, or if that is unknown.
     logprobs: Option<Logprobs>,
     /// Batch API; `None` if unknown.
-    pub(in crate::ask) batch: Option<VendorBatch>,
+    pub(crate) batch: Option<VendorBatch>,
     /// Failure to constrain replies; `None` if the vendor obeys a constraint, or if that is unknown.
     constrain: Option<Constraining>,
     /// Field of the request body without which requests are not repeatable.
-    pub(in crate::ask) pin: Option<String>,
+    pub(crate) pin: Option<String>,
     /// Headers that name the account and are not secret, each with the environment variable that holds its value.
     #[serde(default)]
-    pub(in crate::ask) account: BTreeMap<String, String>,
+    pub(crate) account: BTreeMap<String, String>,
     /// Valid forms of a base URL; empty if a base URL without a path is valid.
     #[serde(default)]
     pub(super) addresses: Vec<String>,
@@ -128,7 +128,7 @@ impl Vendor {
     }
 
     /// True if the built-in table lists exactly this host name. A name below a listed domain may belong to any customer.
-    pub(in crate::ask) fn has_host(host: &str) -> bool {
+    pub(crate) fn has_host(host: &str) -> bool {
         VENDORS
             .vendor
             .iter()
@@ -137,7 +137,7 @@ impl Vendor {
     }
 
     /// True if the host belongs to this vendor.
-    pub(in crate::ask) fn owns_host(&self, host: &str) -> bool {
+    pub(crate) fn owns_host(&self, host: &str) -> bool {
         self.hosts
             .iter()
             .any(|suffix| matches_host_suffix(host, suffix))
@@ -161,7 +161,7 @@ impl Vendor {
     ///
     /// # Errors
     /// The message lists the valid forms.
-    pub(in crate::ask) fn check_address(&self, base: &BaseUrl) -> Result<(), Error> {
+    pub(crate) fn check_address(&self, base: &BaseUrl) -> Result<(), Error> {
         if self.addresses.is_empty() || base.has_path() {
             return Ok(());
         }
@@ -171,12 +171,12 @@ impl Vendor {
     }
 
     /// True if constraints on replies have no effect at this vendor.
-    pub(in crate::ask) fn ignores_constraints(&self) -> bool {
+    pub(crate) fn ignores_constraints(&self) -> bool {
         self.constrain == Some(Constraining::Ignored)
     }
 
     /// Why the vendor returns no token probabilities, as a verb phrase for messages; `None` if it may return them.
-    pub(in crate::ask) fn without_probabilities(&self) -> Option<&'static str> {
+    pub(crate) fn without_probabilities(&self) -> Option<&'static str> {
         self.logprobs.map(|logprobs| match logprobs {
             Logprobs::Ignored => "takes the request for probabilities and ignores it",
             Logprobs::No => "states no probabilities of tokens",
@@ -184,7 +184,7 @@ impl Vendor {
     }
 
     /// Header in which the vendor expects the key.
-    pub(in crate::ask) fn key_header(&self) -> KeyHeader {
+    pub(crate) fn key_header(&self) -> KeyHeader {
         match self.header {
             Header::Bearer => KeyHeader::Bearer,
             Header::ApiKey => KeyHeader::ApiKey,
@@ -192,7 +192,7 @@ impl Vendor {
     }
 
     /// Resolves `Auto` to the field that the vendor expects, or to `MaxTokens` without a vendor. Never returns `Auto`.
-    pub(in crate::ask) fn token_field_at(vendor: Option<&Self>, field: TokenField) -> TokenField {
+    pub(crate) fn token_field_at(vendor: Option<&Self>, field: TokenField) -> TokenField {
         match field {
             TokenField::Auto => vendor.map_or(TokenField::MaxTokens, Self::token_field),
             field => field,

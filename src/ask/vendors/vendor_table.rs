@@ -12,7 +12,7 @@ use crate::types::text::TomlFault;
 
 /// Vendors of a file, with priority over the built-in table; empty by default.
 #[derive(Debug, Clone, Copy, Default)]
-pub(in crate::ask) struct VendorTable(&'static [Vendor]);
+pub(crate) struct VendorTable(&'static [Vendor]);
 
 /// Content of a file.
 #[derive(Deserialize)]
@@ -29,7 +29,7 @@ impl VendorTable {
     ///
     /// # Errors
     /// If the file cannot be read or parsed, has no vendor, or has a key in place of a variable name; the error does not show the key.
-    pub(in crate::ask) fn read(path: &Path) -> Result<Self> {
+    pub(crate) fn read(path: &Path) -> Result<Self> {
         let text = reading::settings(path)?;
         let Rows { vendor: rows, .. } = toml::from_str(&text).map_err(|e: toml::de::Error| {
             let TomlFault { line, problem } = TomlFault::new(&text, &e);
@@ -56,7 +56,7 @@ impl VendorTable {
     }
 
     /// Finds the vendor of a host in the file or else in the built-in table.
-    pub(in crate::ask) fn at_host(self, host: &str) -> Option<&'static Vendor> {
+    pub(crate) fn at_host(self, host: &str) -> Option<&'static Vendor> {
         self.0
             .iter()
             .find(|vendor| vendor.owns_host(host))
@@ -64,7 +64,7 @@ impl VendorTable {
     }
 
     /// Finds the vendor whose keys have the form of this one, in the file or else in the built-in table.
-    pub(in crate::ask) fn by_key(self, key: &str) -> Option<&'static Vendor> {
+    pub(crate) fn by_key(self, key: &str) -> Option<&'static Vendor> {
         self.0
             .iter()
             .find(|vendor| vendor.has_key(key))

@@ -37,7 +37,7 @@ pub(super) fn cost_in_body(body: &Value) -> Option<StatedCost> {
 const LITELLM: &str = "x-litellm-response-cost";
 
 /// The charge in the headers of a response, in US dollars; the highest of several. `None` if the server states none.
-pub(in crate::ask) fn cost_in_headers(headers: &HeaderMap) -> Option<StatedCost> {
+pub(crate) fn cost_in_headers(headers: &HeaderMap) -> Option<StatedCost> {
     headers
         .iter()
         .filter(|(name, _)| name.as_str() == LITELLM || is_cost_of_request(name.as_str()))

@@ -24,7 +24,7 @@ const RESPONSES_ONLY: [&str; 3] = [
 ];
 
 /// API that a server asks for when it refuses a request; `None` if it asks for no other API.
-pub(in crate::ask) fn requested_wire(api_error: &ApiError, sent: Wire) -> Option<Wire> {
+pub(crate) fn requested_wire(api_error: &ApiError, sent: Wire) -> Option<Wire> {
     let wanted = if api_error.mentions_any(&RESPONSES_ONLY) {
         Wire::Responses
     } else if api_error.mentions_any(&STREAM_ONLY) {

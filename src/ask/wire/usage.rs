@@ -16,7 +16,7 @@ pub(super) fn in_body(body: &Value) -> Option<Usage> {
 }
 
 /// Adds the charge that the headers of a response state; the higher one counts. Without a usage, a charge of 0 states nothing.
-pub(in crate::ask) fn with_cost(usage: Option<Usage>, cost: Option<StatedCost>) -> Option<Usage> {
+pub(crate) fn with_cost(usage: Option<Usage>, cost: Option<StatedCost>) -> Option<Usage> {
     match (usage, cost) {
         (Some(usage), cost) => Some(Usage {
             cost: usage.cost.max(cost),

@@ -54,12 +54,12 @@ static PRESETS: LazyLock<BTreeMap<String, Preset>> =
     LazyLock::new(|| toml::from_str(SETS).unwrap_or_default());
 
 /// True if a preset has this name.
-pub(in crate::data) fn is_known(name: &str) -> bool {
+pub(crate) fn is_known(name: &str) -> bool {
     PRESETS.contains_key(name)
 }
 
 /// Names of all presets.
-pub(in crate::data) fn names() -> Vec<&'static str> {
+pub(crate) fn names() -> Vec<&'static str> {
     PRESETS.keys().map(String::as_str).collect()
 }
 

@@ -34,7 +34,7 @@ pub(super) struct Summary<'a> {
 }
 
 /// Start of a line about rows that are left out.
-pub(in crate::data) const LEFT_OUT: &str = "left out: ";
+pub(crate) const LEFT_OUT: &str = "left out: ";
 
 /// Maximum number of families without a warning that tables are hard to read (chosen).
 const MANY_FAMILIES: usize = 60;

@@ -5,7 +5,7 @@ use darkqa_score::open::{Group, OpenCell};
 
 /// One line with the number of scored answers, then one line for each other outcome that occurs.
 #[must_use]
-pub(in crate::report) fn coverage(report: &OpenReport<'_>) -> Vec<String> {
+pub(crate) fn coverage(report: &OpenReport<'_>) -> Vec<String> {
     let scored = total(report, OpenCell::scored);
     let planned = total(report, |cell| cell.planned);
     let unjudged = match report.judge {

@@ -37,7 +37,7 @@ pub(crate) struct OpenReport<'a> {
 
 impl OpenReport<'_> {
     /// Names of all runs.
-    pub(in crate::report) fn names(&self) -> Vec<String> {
+    pub(crate) fn names(&self) -> Vec<String> {
         self.runs
             .iter()
             .map(|(name, _)| (*name).to_owned())

@@ -17,11 +17,11 @@ use crate::types::{Axis, AxisLevel, EnhancerName, FrameId, ObjectCrop, Thumbnail
 use darkqa_score::model_in_condition;
 
 /// Result code of a reply that could not be parsed. Smaller codes are choice indices or marks of the judge ([`PageKind`]).
-pub(in crate::report) const UNREAD: u8 = 26;
+pub(crate) const UNREAD: u8 = 26;
 /// Result code of a failed trial.
-pub(in crate::report) const FAILED: u8 = 27;
+pub(crate) const FAILED: u8 = 27;
 /// Result code of an item that the subject was not asked.
-pub(in crate::report) const ABSENT: u8 = 28;
+pub(crate) const ABSENT: u8 = 28;
 
 /// Maximum lengths of a reply on the page in characters, tried in order until all replies fit into [`SizeLimit::text`].
 const MAX_REPLY_CHARS: [usize; 5] = [20_000, 2_000, 400, 100, 30];
@@ -45,17 +45,17 @@ const MAX_PACKED_BYTES: usize = 10_500_000;
 
 /// Maximum sizes of the replies and the thumbnails on the page.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::report) struct SizeLimit {
+pub(crate) struct SizeLimit {
     /// Total size of the distinct replies, in bytes.
-    pub(in crate::report) text: usize,
+    pub(crate) text: usize,
     /// Total size of the thumbnails and object crops, in bytes.
-    pub(in crate::report) pictures: usize,
+    pub(crate) pictures: usize,
 }
 
 /// Kind of the report's questions.
 #[derive(Debug, Clone, Copy, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub(in crate::report) enum PageKind {
+pub(crate) enum PageKind {
     /// Multiple-choice questions; a result is the index of the chosen answer.
     Choice,
     /// Open questions; a result is the judge's mark from 1 to 5, or 0 for an empty answer.
@@ -65,62 +65,62 @@ pub(in crate::report) enum PageKind {
 /// All data of the page's script. Entries refer to each other by their indices in these lists. Nested lists have a row for each subject
 /// and a column for each item.
 #[derive(Serialize)]
-pub(in crate::report) struct PageData<'a> {
-    pub(in crate::report) kind: PageKind,
+pub(crate) struct PageData<'a> {
+    pub(crate) kind: PageKind,
     /// Name of each run.
-    pub(in crate::report) runs: Vec<String>,
+    pub(crate) runs: Vec<String>,
     /// Folder of each run.
-    pub(in crate::report) folders: Vec<String>,
+    pub(crate) folders: Vec<String>,
     /// Name and severity of each level.
-    pub(in crate::report) levels: Vec<[String; 2]>,
+    pub(crate) levels: Vec<[String; 2]>,
     /// Recorded name and display name of each family.
-    pub(in crate::report) families: Vec<[&'a str; 2]>,
-    pub(in crate::report) frames: Vec<&'a str>,
+    pub(crate) families: Vec<[&'a str; 2]>,
+    pub(crate) frames: Vec<&'a str>,
     /// Width and height of each frame in pixels; `None` if no thumbnail records them.
-    pub(in crate::report) sizes: Vec<Option<[u32; 2]>>,
-    pub(in crate::report) subjects: Vec<ModelInCondition<'a>>,
-    pub(in crate::report) questions: Vec<Question<'a>>,
-    pub(in crate::report) choices: Vec<&'a [String]>,
-    pub(in crate::report) items: Vec<Item>,
+    pub(crate) sizes: Vec<Option<[u32; 2]>>,
+    pub(crate) subjects: Vec<ModelInCondition<'a>>,
+    pub(crate) questions: Vec<Question<'a>>,
+    pub(crate) choices: Vec<&'a [String]>,
+    pub(crate) items: Vec<Item>,
     /// Result codes by strict parsing.
-    pub(in crate::report) strict: Vec<Vec<u8>>,
+    pub(crate) strict: Vec<Vec<u8>>,
     /// Result codes by lenient parsing; empty for open questions.
-    pub(in crate::report) lenient: Vec<Vec<u8>>,
+    pub(crate) lenient: Vec<Vec<u8>>,
     /// Distinct reasons for unparsed replies and failed trials.
-    pub(in crate::report) reasons: Vec<String>,
+    pub(crate) reasons: Vec<String>,
     /// Index into `reasons` of each result.
-    pub(in crate::report) why: Vec<Vec<usize>>,
+    pub(crate) why: Vec<Vec<usize>>,
     /// Distinct texts of replies.
-    pub(in crate::report) texts: Vec<String>,
+    pub(crate) texts: Vec<String>,
     /// Index into `texts` of each reply.
-    pub(in crate::report) replies: Vec<Vec<usize>>,
+    pub(crate) replies: Vec<Vec<usize>>,
     /// Index into `texts` of each judge's reply; empty without a judge.
-    pub(in crate::report) judged: Vec<Vec<usize>>,
-    pub(in crate::report) confusions: Vec<Confusion<'a>>,
+    pub(crate) judged: Vec<Vec<usize>>,
+    pub(crate) confusions: Vec<Confusion<'a>>,
     /// Images by frame index and condition name.
-    pub(in crate::report) thumbnails: BTreeMap<usize, BTreeMap<String, Picture<'a>>>,
+    pub(crate) thumbnails: BTreeMap<usize, BTreeMap<String, Picture<'a>>>,
 }
 
 /// Subject of the report: a model in a condition.
 #[derive(Serialize)]
-pub(in crate::report) struct ModelInCondition<'a> {
-    pub(in crate::report) name: String,
-    pub(in crate::report) model: &'a str,
+pub(crate) struct ModelInCondition<'a> {
+    pub(crate) name: String,
+    pub(crate) model: &'a str,
     /// True if the model is a reference and not under test.
-    pub(in crate::report) reference: bool,
-    pub(in crate::report) condition: String,
+    pub(crate) reference: bool,
+    pub(crate) condition: String,
     /// Display text of variant and enhancer; `blind` without images.
-    pub(in crate::report) light: String,
-    pub(in crate::report) level: Option<AxisLevel>,
-    pub(in crate::report) variant: String,
-    pub(in crate::report) enhancer: Option<&'a str>,
+    pub(crate) light: String,
+    pub(crate) level: Option<AxisLevel>,
+    pub(crate) variant: String,
+    pub(crate) enhancer: Option<&'a str>,
     /// Index of the subject with the same model at L0 and no enhancer; `None` if it does not exist.
-    pub(in crate::report) clean: Option<usize>,
+    pub(crate) clean: Option<usize>,
 }
 
 impl<'a> ModelInCondition<'a> {
     /// A subject as the script needs it.
-    pub(in crate::report) fn new(
+    pub(crate) fn new(
         subject: &'a model_in_condition::ModelInCondition,
         clean: Option<usize>,
     ) -> Self {
@@ -142,63 +142,63 @@ impl<'a> ModelInCondition<'a> {
 }
 
 #[derive(Serialize)]
-pub(in crate::report) struct Question<'a> {
-    pub(in crate::report) id: &'a str,
-    pub(in crate::report) frame: usize,
-    pub(in crate::report) family: usize,
-    pub(in crate::report) text: &'a str,
-    pub(in crate::report) evidence: Option<&'a Value>,
+pub(crate) struct Question<'a> {
+    pub(crate) id: &'a str,
+    pub(crate) frame: usize,
+    pub(crate) family: usize,
+    pub(crate) text: &'a str,
+    pub(crate) evidence: Option<&'a Value>,
     /// Bounding boxes of the objects in question, in pixels of the frame.
-    pub(in crate::report) outlines: Vec<PixelBox>,
+    pub(crate) outlines: Vec<PixelBox>,
     /// Bounding box of all objects in question together.
-    pub(in crate::report) object: Option<PixelBox>,
+    pub(crate) object: Option<PixelBox>,
     /// Reference answer to an open question.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(in crate::report) answer: Option<&'a str>,
+    pub(crate) answer: Option<&'a str>,
     /// Further accepted answers to an open question.
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
-    pub(in crate::report) also_right: &'a [String],
+    pub(crate) also_right: &'a [String],
 }
 
 #[derive(Serialize)]
-pub(in crate::report) struct Item {
+pub(crate) struct Item {
     /// Question id, with the item's number if it is not the question's first item, as in `id#2`.
-    pub(in crate::report) name: String,
-    pub(in crate::report) question: usize,
+    pub(crate) name: String,
+    pub(crate) question: usize,
     /// Index into the lists of choices.
-    pub(in crate::report) choices: usize,
+    pub(crate) choices: usize,
     /// Index of the true choice; `None` if the truth is unknown.
-    pub(in crate::report) truth: Option<usize>,
+    pub(crate) truth: Option<usize>,
 }
 
 #[derive(Serialize)]
-pub(in crate::report) struct Confusion<'a> {
-    pub(in crate::report) subject: usize,
-    pub(in crate::report) family: &'a str,
-    pub(in crate::report) labels: &'a [String],
-    pub(in crate::report) counts: &'a [Vec<usize>],
+pub(crate) struct Confusion<'a> {
+    pub(crate) subject: usize,
+    pub(crate) family: &'a str,
+    pub(crate) labels: &'a [String],
+    pub(crate) counts: &'a [Vec<usize>],
 }
 
 /// Images of a frame in one condition.
 #[derive(Serialize)]
-pub(in crate::report) struct Picture<'a> {
+pub(crate) struct Picture<'a> {
     /// Small copy of the whole image, as a data URL.
-    pub(in crate::report) small: &'a str,
+    pub(crate) small: &'a str,
     /// Middle of the image, as a data URL.
-    pub(in crate::report) crop: &'a str,
+    pub(crate) crop: &'a str,
     /// Gain applied to the crop, in EV.
-    pub(in crate::report) stops: f32,
-    pub(in crate::report) objects: &'a [ObjectCrop],
+    pub(crate) stops: f32,
+    pub(crate) objects: &'a [ObjectCrop],
 }
 
 /// List of distinct entries, and the index of each entry.
-pub(in crate::report) struct Distinct<T> {
-    pub(in crate::report) list: Vec<T>,
-    pub(in crate::report) indices: HashMap<T, usize>,
+pub(crate) struct Distinct<T> {
+    pub(crate) list: Vec<T>,
+    pub(crate) indices: HashMap<T, usize>,
 }
 
 impl<T: Copy + Eq + std::hash::Hash> Distinct<T> {
-    pub(in crate::report) fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self {
             list: Vec::new(),
             indices: HashMap::new(),
@@ -206,7 +206,7 @@ impl<T: Copy + Eq + std::hash::Hash> Distinct<T> {
     }
 
     /// Returns the index of an entry; adds the entry if it is new.
-    pub(in crate::report) fn index_of(&mut self, entry: T) -> usize {
+    pub(crate) fn index_of(&mut self, entry: T) -> usize {
         *self.indices.entry(entry).or_insert_with(|| {
             self.list.push(entry);
             self.list.len() - 1
@@ -219,7 +219,7 @@ impl<T: Copy + Eq + std::hash::Hash> Distinct<T> {
 ///
 /// # Errors
 /// If the data cannot be serialized.
-pub(in crate::report) fn packed_by<'a>(data: impl Fn(SizeLimit) -> PageData<'a>) -> Result<String> {
+pub(crate) fn packed_by<'a>(data: impl Fn(SizeLimit) -> PageData<'a>) -> Result<String> {
     let mut packed = String::new();
     for limit in SIZE_LIMITS {
         packed = pack(&data(limit))?;
@@ -245,7 +245,7 @@ fn compress(data: &PageData<'_>) -> std::io::Result<Vec<u8>> {
 }
 
 /// Cuts all texts to one maximum length: the first of [`MAX_REPLY_CHARS`] at which they fit together into `limit` bytes, else the last.
-pub(in crate::report) fn shortened(texts: &[&str], limit: usize) -> Vec<String> {
+pub(crate) fn shortened(texts: &[&str], limit: usize) -> Vec<String> {
     let max_chars = MAX_REPLY_CHARS
         .into_iter()
         .find(|max| {
@@ -275,7 +275,7 @@ fn cut(text: &str, max_chars: usize) -> &str {
 }
 
 /// Width and height of each frame in pixels; `None` if no thumbnail records them.
-pub(in crate::report) fn sizes(thumbnails: &[Thumbnail], frames: &[&str]) -> Vec<Option<[u32; 2]>> {
+pub(crate) fn sizes(thumbnails: &[Thumbnail], frames: &[&str]) -> Vec<Option<[u32; 2]>> {
     let recorded: HashMap<&str, [u32; 2]> = thumbnails
         .iter()
         .filter_map(|thumbnail| Some((&*thumbnail.frame.0, thumbnail.size?)))
@@ -287,7 +287,7 @@ pub(in crate::report) fn sizes(thumbnails: &[Thumbnail], frames: &[&str]) -> Vec
 }
 
 /// Name and severity of each distinct level in ascending order, such as `L3` and `6 EV`.
-pub(in crate::report) fn levels(levels: impl Iterator<Item = AxisLevel>) -> Vec<[String; 2]> {
+pub(crate) fn levels(levels: impl Iterator<Item = AxisLevel>) -> Vec<[String; 2]> {
     let levels: BTreeSet<AxisLevel> = levels.collect();
     levels
         .into_iter()
@@ -327,7 +327,7 @@ pub(crate) fn fitting_thumbnails<'a>(
 
 /// Selects thumbnails, in the order of frame ids, until a frame exceeds `bytes_left`. The result is by frame index, from `indices`, and
 /// condition name. The object crops of a frame are included if they fit into the bytes that remain.
-pub(in crate::report) fn thumbnails<'a>(
+pub(crate) fn thumbnails<'a>(
     all: &'a [Thumbnail],
     indices: &HashMap<&str, usize>,
     mut bytes_left: usize,

@@ -18,7 +18,7 @@ const MARK_REACH: f64 = 50.0;
 
 /// Content of the first screen.
 #[derive(Serialize)]
-pub(in crate::report) struct PageHead {
+pub(crate) struct PageHead {
     summary: String,
     chart: Option<Figure>,
     rows: Vec<FindingRow>,
@@ -70,7 +70,7 @@ impl PageHead {
     }
 
     /// First screen with only a summary.
-    pub(in crate::report) fn from_summary(summary: &str) -> Self {
+    pub(crate) fn from_summary(summary: &str) -> Self {
         Self {
             summary: with_unbroken_percent(summary),
             chart: None,
@@ -80,7 +80,7 @@ impl PageHead {
     }
 
     /// First screen with the summary and the main findings, without chart and images.
-    pub(in crate::report) fn without_images(groups: &FindingGroups<'_>) -> Self {
+    pub(crate) fn without_images(groups: &FindingGroups<'_>) -> Self {
         let first = groups.main_findings();
         let reach = first
             .iter()

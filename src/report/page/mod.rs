@@ -14,7 +14,7 @@ mod strip;
 mod tables;
 
 pub(crate) use data::fitting_thumbnails;
-pub(in crate::report) use head::PageHead;
+pub(crate) use head::PageHead;
 pub use inputs::PageInputs;
 pub(crate) use inputs::PageRun;
 pub(crate) use run_usage::RunUsage;
@@ -126,11 +126,11 @@ pub(crate) struct PageContent<'a> {
     /// Text for the models, in the heading.
     pub(crate) who: String,
     /// First screen; `None` for a page without one.
-    pub(in crate::report) head: Option<PageHead>,
+    pub(crate) head: Option<PageHead>,
     /// Lines at the top about all numbers.
     pub(crate) intro: Vec<String>,
     pub(crate) alerts: &'a [Alert],
-    pub(in crate::report) groups: FindingGroups<'a>,
+    pub(crate) groups: FindingGroups<'a>,
     pub(crate) how_to_read: String,
     pub(crate) tables: &'a [Table],
     pub(crate) sections: &'static [Section],
@@ -218,25 +218,25 @@ pub(crate) fn page_of<'a>(
 }
 
 /// Content of the page of open questions, without its figures.
-pub(in crate::report) struct OpenContent<'a> {
-    pub(in crate::report) title: String,
+pub(crate) struct OpenContent<'a> {
+    pub(crate) title: String,
     /// One sentence with the scores; `None` without scores at two levels.
-    pub(in crate::report) summary: Option<String>,
-    pub(in crate::report) intro: Vec<String>,
-    pub(in crate::report) alerts: &'a [String],
-    pub(in crate::report) tables: &'a [Table],
-    pub(in crate::report) sections: &'static [Section],
+    pub(crate) summary: Option<String>,
+    pub(crate) intro: Vec<String>,
+    pub(crate) alerts: &'a [String],
+    pub(crate) tables: &'a [Table],
+    pub(crate) sections: &'static [Section],
     /// Name and manifest of each run.
-    pub(in crate::report) runs: &'a [(&'a str, &'a RunManifest)],
+    pub(crate) runs: &'a [(&'a str, &'a RunManifest)],
     /// Items as compressed JSON in base64.
-    pub(in crate::report) items: String,
+    pub(crate) items: String,
 }
 
 /// Renders the page of open questions.
 ///
 /// # Errors
 /// If the template cannot be rendered.
-pub(in crate::report) fn page_of_open_questions(
+pub(crate) fn page_of_open_questions(
     content: OpenContent<'_>,
     figures: &[Figure],
 ) -> Result<String> {

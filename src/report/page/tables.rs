@@ -15,7 +15,7 @@ const MIN_FOLDED_ROWS: usize = 3;
 
 /// Table for the template.
 #[derive(Serialize)]
-pub(in crate::report) struct PageTable<'a> {
+pub(crate) struct PageTable<'a> {
     caption: &'a str,
     /// True if the table is closed until the reader opens it.
     folded: bool,
@@ -51,7 +51,7 @@ struct PageCell {
 }
 
 /// Tables of a section that have rows.
-pub(in crate::report) fn page_tables<'a>(tables: &'a [Table], section: &str) -> Vec<PageTable<'a>> {
+pub(crate) fn page_tables<'a>(tables: &'a [Table], section: &str) -> Vec<PageTable<'a>> {
     tables
         .iter()
         .filter(|table| table.section == section)

@@ -15,7 +15,7 @@ use crate::types::text::escape_hidden;
 const GROUP_WIDTH: usize = 15;
 
 /// Head, alerts and summary, then the main finding of each group, or all findings with a note on how to read them.
-pub(in crate::report) fn findings(
+pub(crate) fn findings(
     head: &str,
     alerts: &[Alert],
     groups: &FindingGroups<'_>,

@@ -41,11 +41,11 @@ impl StatedCost {
     }
 
     /// The number of units; only to hold a charge in memory.
-    pub(in crate::types) fn units(self) -> u64 {
+    pub(crate) fn units(self) -> u64 {
         self.0
     }
 
-    pub(in crate::types) fn from_units(units: u64) -> Self {
+    pub(crate) fn from_units(units: u64) -> Self {
         Self(units)
     }
 }

@@ -5,37 +5,37 @@
 
 /// Point of photon transfer: a tile of a pair of flats.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in super::super) struct Point {
-    pub(in super::super) exposure: usize,
-    pub(in super::super) plane: usize,
+pub(crate) struct Point {
+    pub(crate) exposure: usize,
+    pub(crate) plane: usize,
     /// Degrees of freedom of the variance, times the weight of the pair.
-    pub(in super::super) weight: f64,
+    pub(crate) weight: f64,
     /// Light above the offset, in ADU.
-    pub(in super::super) signal: f64,
+    pub(crate) signal: f64,
     /// Variance of one frame without read noise, in ADU².
-    pub(in super::super) variance: f64,
+    pub(crate) variance: f64,
     /// Variance of the read noise, in ADU².
-    pub(in super::super) within: f64,
+    pub(crate) within: f64,
 }
 
 /// Straight line through points of photon transfer.
 #[derive(Debug, Clone, PartialEq)]
-pub(in super::super) struct Transfer {
+pub(crate) struct Transfer {
     /// K of all planes together, in ADU per electron.
-    pub(in super::super) gain: f64,
+    pub(crate) gain: f64,
     /// K of each plane; `None` for a plane without points.
-    pub(in super::super) by_plane: Vec<Option<f64>>,
+    pub(crate) by_plane: Vec<Option<f64>>,
     /// Change of variance / signal over the range of signals, relative to K.
-    pub(in super::super) bend: f64,
+    pub(crate) bend: f64,
     /// Intercept of a line that need not pass through 0: its variance without light, in ADU².
-    pub(in super::super) intercept: f64,
+    pub(crate) intercept: f64,
     /// Standard error of `intercept` from the noise of the sites alone.
-    pub(in super::super) intercept_error: f64,
+    pub(crate) intercept_error: f64,
 }
 
 impl Transfer {
     /// Fits a line through points of this number of planes.
-    pub(in super::super) fn fit(points: &[Point], planes: usize) -> Self {
+    pub(crate) fn fit(points: &[Point], planes: usize) -> Self {
         let gain = gain(points);
         let by_plane = (0..planes)
             .map(|plane| {
@@ -64,7 +64,7 @@ fn sum(points: &[Point], term: impl Fn(&Point) -> f64) -> f64 {
 
 /// Gain K = Σ w S V / Σ w S² with w = n / (K S + read variance)², because a variance V has the variance 2 (K S + …)² / n. The weights
 /// depend on K; three iterations are enough for them to converge.
-pub(in super::super) fn gain(points: &[Point]) -> f64 {
+pub(crate) fn gain(points: &[Point]) -> f64 {
     let mut gain = sum(points, |p| p.weight * p.variance) / sum(points, |p| p.weight * p.signal);
     for _ in 0..3 {
         let product = sum(points, |p| weight(p, gain) * p.signal * p.variance);

@@ -7,7 +7,7 @@ pub(super) const EXPORT: &str = "export the mosaic, for example as TIFF with `dc
 
 /// Form of a file, and the range of its samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in super::super) enum MosaicForm {
+pub(crate) enum MosaicForm {
     /// 16-bit greyscale PNG.
     Png,
     /// 16-bit greyscale TIFF.

@@ -20,7 +20,7 @@ pub(crate) struct PlotFit {
 /// 3.2; Filliben 1975). The rounding of codes counts as noise.
 ///
 /// Equal residuals fill an interval of probability; each is plotted at the mean quantile of that interval.
-pub(in super::super) fn plot_fit(residuals: &Residuals) -> PlotFit {
+pub(crate) fn plot_fit(residuals: &Residuals) -> PlotFit {
     let counts = residuals.counts();
     let total: f64 = counts.iter().map(|(_, count)| *count as f64).sum();
     let centre = counts

@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 pub(super) const MIN_BIAS_FRAMES: usize = 2;
 
 /// Minimum number of exposures of a setting, each with a pair of flats.
-pub(in super::super) const MIN_EXPOSURES: usize = 3;
+pub(crate) const MIN_EXPOSURES: usize = 3;
 
 /// Name of the list of frames.
 pub(super) const TABLE: &str = "frames.csv";
@@ -17,36 +17,36 @@ pub(super) const TABLE: &str = "frames.csv";
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Recording {
     /// Settings, sorted by the last number in their names, then by name.
-    pub(in super::super) settings: Vec<SettingFiles>,
+    pub(crate) settings: Vec<SettingFiles>,
     /// Notes on files and folders that are left out.
-    pub(in super::super) notes: Vec<String>,
+    pub(crate) notes: Vec<String>,
 }
 
 /// Frames of one setting of the camera's gain, such as ISO 800.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub(in super::super) struct SettingFiles {
-    pub(in super::super) name: String,
+pub(crate) struct SettingFiles {
+    pub(crate) name: String,
     /// Frames without light at the shortest exposure.
-    pub(in super::super) bias: Vec<PathBuf>,
+    pub(crate) bias: Vec<PathBuf>,
     /// Evenly lit frames by exposure.
-    pub(in super::super) exposures: Vec<ExposureFiles>,
+    pub(crate) exposures: Vec<ExposureFiles>,
     /// Overexposed frames.
-    pub(in super::super) white: Vec<PathBuf>,
+    pub(crate) white: Vec<PathBuf>,
 }
 
 /// Frames of one exposure.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub(in super::super) struct ExposureFiles {
-    pub(in super::super) name: String,
+pub(crate) struct ExposureFiles {
+    pub(crate) name: String,
     /// Evenly lit frames, in consecutive pairs.
-    pub(in super::super) flats: Vec<PathBuf>,
+    pub(crate) flats: Vec<PathBuf>,
     /// Frames of the same exposure without light.
-    pub(in super::super) dark: Vec<PathBuf>,
+    pub(crate) dark: Vec<PathBuf>,
 }
 
 impl SettingFiles {
     /// Last number in the name, such as 800 in `a7s2-iso800`; `None` without a number.
-    pub(in super::super) fn number(&self) -> Option<f64> {
+    pub(crate) fn number(&self) -> Option<f64> {
         let end = self.name.rfind(|c: char| c.is_ascii_digit())? + 1;
         let start = self.name[..end].rfind(|c: char| !c.is_ascii_digit() && c != '.');
         // The character before the number may have several bytes.

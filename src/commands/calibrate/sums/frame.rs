@@ -8,14 +8,14 @@ use super::gather;
 
 /// Sums of the samples of a frame for each part of a row, without hot pixels.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(in super::super) struct PlaneSums {
+pub(crate) struct PlaneSums {
     layout: Layout,
     /// Number and sum of the samples of each part of a row.
     rows: Vec<[u64; 2]>,
 }
 
 impl PlaneSums {
-    pub(in super::super) fn new(layout: Layout, samples: &[u16], hot: &HotPixels) -> Self {
+    pub(crate) fn new(layout: Layout, samples: &[u16], hot: &HotPixels) -> Self {
         let rows = (0..layout.plane_rows())
             .into_par_iter()
             .with_min_len(64)
@@ -33,12 +33,12 @@ impl PlaneSums {
     }
 
     /// Number and sum of the samples of each part of a row.
-    pub(in super::super) fn rows(&self) -> &[[u64; 2]] {
+    pub(crate) fn rows(&self) -> &[[u64; 2]] {
         &self.rows
     }
 
     /// Number and sum of the samples of each plane.
-    pub(in super::super) fn planes(&self) -> Vec<[u64; 2]> {
+    pub(crate) fn planes(&self) -> Vec<[u64; 2]> {
         let mut planes = vec![[0; 2]; self.layout.cfa.planes()];
         for (plane_row, [count, sum]) in self.rows.iter().enumerate() {
             let [row, parity] = self.layout.place(plane_row);
@@ -52,13 +52,13 @@ impl PlaneSums {
 
 /// Maximum code of each plane of a frame, with its number of samples.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(in super::super) struct TopCode {
+pub(crate) struct TopCode {
     /// For each plane: number of samples, maximum code, and number of samples with this code.
-    pub(in super::super) planes: Vec<(u64, u16, u64)>,
+    pub(crate) planes: Vec<(u64, u16, u64)>,
 }
 
 impl TopCode {
-    pub(in super::super) fn new(layout: Layout, samples: &[u16], hot: &HotPixels) -> Self {
+    pub(crate) fn new(layout: Layout, samples: &[u16], hot: &HotPixels) -> Self {
         let rows: Vec<(u64, u16, u64)> = (0..layout.plane_rows())
             .into_par_iter()
             .with_min_len(64)
@@ -89,7 +89,7 @@ impl TopCode {
     }
 
     /// Maximum code of the frame.
-    pub(in super::super) fn max(&self) -> u16 {
+    pub(crate) fn max(&self) -> u16 {
         self.planes
             .iter()
             .map(|(_, code, _)| *code)
@@ -98,7 +98,7 @@ impl TopCode {
     }
 
     /// Largest share of the samples of a plane at its maximum code, and this code.
-    pub(in super::super) fn largest_share(&self) -> (f64, u16) {
+    pub(crate) fn largest_share(&self) -> (f64, u16) {
         self.planes
             .iter()
             .map(|(count, code, with_it)| {

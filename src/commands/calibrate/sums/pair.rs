@@ -11,13 +11,13 @@ use rayon::prelude::*;
 use super::super::hot_pixels::HotPixels;
 use super::super::layout::{Layout, TILES};
 use super::gather;
-pub(in super::super) use neighbours::NeighbourSums;
+pub(crate) use neighbours::NeighbourSums;
 use neighbours::RowNeighbours;
 use scatter::{Products, Scatter};
 
 /// Sums over two frames A and B for each part of a row and tile, without hot pixels.
 #[derive(Debug)]
-pub(in super::super) struct PairSums {
+pub(crate) struct PairSums {
     layout: Layout,
     rows: Vec<PairRow>,
 }
@@ -42,21 +42,21 @@ struct Cell {
 
 /// Light and noise of a tile of one plane.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(in super::super) struct TileSums {
-    pub(in super::super) plane: usize,
+pub(crate) struct TileSums {
+    pub(crate) plane: usize,
     /// Number of sites.
-    pub(in super::super) count: f64,
+    pub(crate) count: f64,
     /// Sums of A and of B, in ADU.
-    pub(in super::super) sums: [f64; 2],
+    pub(crate) sums: [f64; 2],
     /// Products around the means of the parts of rows in the tile, without fall-off and row noise.
-    pub(in super::super) scatter: Scatter,
+    pub(crate) scatter: Scatter,
     /// Degrees of freedom of `scatter`: the number of sites minus the number of parts of rows.
-    pub(in super::super) free: f64,
+    pub(crate) free: f64,
 }
 
 impl TileSums {
     /// Mean of both frames, in ADU.
-    pub(in super::super) fn mean(&self) -> f64 {
+    pub(crate) fn mean(&self) -> f64 {
         (self.sums[0] + self.sums[1]) / self.count / 2.0
     }
 
@@ -64,29 +64,29 @@ impl TileSums {
     ///
     /// A and B · ratio have equal light, so that their difference D has neither fall-off nor the response of the sites. If S is the light
     /// of B, the variance of D is K · ratio · S + ratio² · K · S = 2 ratio · K · S̄, where S̄ is the mean light of both.
-    pub(in super::super) fn variance(&self, ratio: f64) -> f64 {
+    pub(crate) fn variance(&self, ratio: f64) -> f64 {
         self.scatter.squared_difference(ratio) / self.free / (2.0 * ratio)
     }
 }
 
 /// Noise of a pair of frames without light.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in super::super) struct PairNoise {
+pub(crate) struct PairNoise {
     /// Variance of one frame within its rows, in ADU².
-    pub(in super::super) within: f64,
+    pub(crate) within: f64,
     /// Variance of the row noise, in ADU²; may be negative by chance.
-    pub(in super::super) row: f64,
+    pub(crate) row: f64,
 }
 
 impl PairNoise {
     /// Standard deviation of the row noise in ADU; 0 if the variance is negative by chance.
-    pub(in super::super) fn row_deviation(self) -> f64 {
+    pub(crate) fn row_deviation(self) -> f64 {
         self.row.max(0.0).sqrt()
     }
 }
 
 impl PairSums {
-    pub(in super::super) fn new(layout: Layout, [a, b]: [&[u16]; 2], hot: &HotPixels) -> Self {
+    pub(crate) fn new(layout: Layout, [a, b]: [&[u16]; 2], hot: &HotPixels) -> Self {
         let rows = (0..layout.plane_rows())
             .into_par_iter()
             .with_min_len(64)
@@ -103,7 +103,7 @@ impl PairSums {
     }
 
     /// Means of A and of B over all sites.
-    pub(in super::super) fn means(&self) -> [f64; 2] {
+    pub(crate) fn means(&self) -> [f64; 2] {
         let [n, a, b] = self
             .rows
             .iter()
@@ -141,7 +141,7 @@ impl PairSums {
     ///
     /// D is A − B minus the means of its planes, and m is the mean of D over a sensor row. The variance within rows is
     /// Σ(D − m)² / (2 · degrees of freedom). The row noise is var(m) / 2 minus the contribution of the sites, within / width.
-    pub(in super::super) fn noise(&self) -> PairNoise {
+    pub(crate) fn noise(&self) -> PairNoise {
         let step = self.layout.cfa.step();
         let plane_means = self.plane_means();
         let (mut count, mut rows, mut within, mut of_means) = (0.0, 0.0, 0.0, 0.0);
@@ -173,7 +173,7 @@ impl PairSums {
     }
 
     /// Sums over neighbours in the rows of each plane.
-    pub(in super::super) fn neighbours(&self) -> NeighbourSums {
+    pub(crate) fn neighbours(&self) -> NeighbourSums {
         let mut sums = NeighbourSums::none(self.layout.cfa.planes());
         for (plane, row) in self.rows_with_planes() {
             let whole = row.whole();
@@ -188,7 +188,7 @@ impl PairSums {
     }
 
     /// Light and noise of all tiles of all planes, except tiles with fewer than two sites in every row.
-    pub(in super::super) fn tiles(&self) -> Vec<TileSums> {
+    pub(crate) fn tiles(&self) -> Vec<TileSums> {
         let mut tiles = vec![TileSums::default(); self.layout.cfa.planes() * TILES * TILES];
         for (plane_row, row) in self.rows.iter().enumerate() {
             let [at, parity] = self.layout.place(plane_row);

@@ -9,7 +9,7 @@ use super::super::layout::Layout;
 use super::{PlaneSums, gather};
 
 /// Number of histogram steps in an ADU (chosen). Codes are integers but centres are not: residuals are rounded to steps.
-pub(in super::super) const STEPS: i64 = 32;
+pub(crate) const STEPS: i64 = 32;
 
 /// Maximum residual in ADU that is counted in a list; larger ones are counted in a map (chosen far beyond read noise).
 const WINDOW: i64 = 512;
@@ -19,7 +19,7 @@ const SAMPLES_PER_PART: usize = 1 << 20;
 
 /// Centres to subtract from the codes of a frame.
 #[derive(Debug, Clone, Copy)]
-pub(in super::super) enum Centres<'a> {
+pub(crate) enum Centres<'a> {
     /// Means of the planes and rows of the frame itself.
     RowsAndPlanes,
     /// Mean of all frames at each site, then the row means of the differences. This removes a fixed pattern.
@@ -32,7 +32,7 @@ pub(in super::super) enum Centres<'a> {
 
 /// Histogram of residuals, in steps of 1 / [`STEPS`] ADU.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(in super::super) struct Residuals {
+pub(crate) struct Residuals {
     /// Counts from −`WINDOW` to `WINDOW`.
     near: Vec<u64>,
     far: BTreeMap<i64, u64>,
@@ -49,7 +49,7 @@ impl Default for Residuals {
 
 impl Residuals {
     /// Computes the residuals of a frame. `sums` must be the sums of the same frame without the same hot pixels.
-    pub(in super::super) fn new(
+    pub(crate) fn new(
         layout: Layout,
         samples: &[u16],
         sums: &PlaneSums,
@@ -90,7 +90,7 @@ impl Residuals {
     }
 
     /// Counts one residual, in steps.
-    pub(in super::super) fn count(&mut self, steps: i64) {
+    pub(crate) fn count(&mut self, steps: i64) {
         let index = usize::try_from(steps + WINDOW * STEPS).ok();
         match index.and_then(|index| self.near.get_mut(index)) {
             Some(count) => *count += 1,
@@ -99,7 +99,7 @@ impl Residuals {
     }
 
     /// Adds another histogram.
-    pub(in super::super) fn add(&mut self, other: &Self) {
+    pub(crate) fn add(&mut self, other: &Self) {
         for (count, more) in self.near.iter_mut().zip(&other.near) {
             *count += more;
         }
@@ -109,7 +109,7 @@ impl Residuals {
     }
 
     /// All residuals in steps, in ascending order, with their counts.
-    pub(in super::super) fn counts(&self) -> Vec<(i64, u64)> {
+    pub(crate) fn counts(&self) -> Vec<(i64, u64)> {
         let mut all: Vec<(i64, u64)> = (-WINDOW * STEPS..)
             .zip(self.near.iter().copied())
             .filter(|(_, count)| *count > 0)

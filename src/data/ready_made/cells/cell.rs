@@ -14,7 +14,7 @@ use crate::types::text::excerpt;
 
 /// Maximum length of a path or a row id, in bytes. A longer text in the base64 alphabet is a file (as in VLMEvalKit,
 /// `vlmeval/dataset/image_base.py`).
-pub(in crate::data::ready_made) const MAX_NAME_LENGTH: usize = 64;
+pub(crate) const MAX_NAME_LENGTH: usize = 64;
 
 /// Maximum length of a base64 text that is kept in memory, in bytes (chosen). A longer one is read from its file again when needed.
 const MAX_KEPT_BASE64: usize = 1024;
@@ -24,7 +24,7 @@ const MIN_BASE64_LINE: usize = 60;
 
 /// Value in a row, without the bytes of images. Sets have millions of cells, so a cell is no larger than a `String`.
 #[derive(Debug, Clone, PartialEq)]
-pub(in crate::data::ready_made) enum Cell {
+pub(crate) enum Cell {
     /// Null, or no such column in this row.
     Absent,
     Bool(bool),
@@ -40,7 +40,7 @@ pub(in crate::data::ready_made) enum Cell {
 }
 
 /// Fields of a struct with their names.
-pub(in crate::data::ready_made) type Fields = Box<[(Arc<str>, Cell)]>;
+pub(crate) type Fields = Box<[(Arc<str>, Cell)]>;
 
 /// Interner for the names of fields in the cells of a table.
 #[derive(Debug, Default)]
@@ -58,14 +58,14 @@ impl FieldNames {
 
 /// Digest and format of a file whose bytes were dropped.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(in crate::data::ready_made) struct FileFacts {
-    pub(in crate::data::ready_made) digest: Digest,
+pub(crate) struct FileFacts {
+    pub(crate) digest: Digest,
     /// Image format, from the first bytes; `None` if it is not supported.
-    pub(in crate::data::ready_made) format: Option<FileFormat>,
+    pub(crate) format: Option<FileFormat>,
 }
 
 impl FileFacts {
-    pub(in crate::data::ready_made) fn from_bytes(bytes: &[u8]) -> Self {
+    pub(crate) fn from_bytes(bytes: &[u8]) -> Self {
         Self {
             digest: Digest::from_bytes(bytes),
             format: FileFormat::detect(bytes).ok(),
@@ -124,7 +124,7 @@ impl Cell {
     }
 
     /// True if the cell has no value: null, an empty text or list, or a word for a missing value (`nan`, `N/A`, `None`, `null`).
-    pub(in crate::data::ready_made) fn is_absent(&self) -> bool {
+    pub(crate) fn is_absent(&self) -> bool {
         match self {
             Self::Absent => true,
             Self::Text(text) => {
@@ -138,7 +138,7 @@ impl Cell {
     }
 
     /// The cell as text; `None` if it is not a text, number or truth value, or is blank.
-    pub(in crate::data::ready_made) fn text(&self) -> Option<String> {
+    pub(crate) fn text(&self) -> Option<String> {
         match self {
             Self::Bool(is_true) => Some(is_true.to_string()),
             Self::Number(text) => Some(without_zero_fraction(text)),
@@ -148,7 +148,7 @@ impl Cell {
     }
 
     /// Parses a text with a JSON list or object; `None` if the cell has none.
-    pub(in crate::data::ready_made) fn parsed(&self) -> Option<Self> {
+    pub(crate) fn parsed(&self) -> Option<Self> {
         let Self::Text(text) = self else {
             return None;
         };
@@ -159,7 +159,7 @@ impl Cell {
     }
 
     /// Field of a struct by its name, or item of a list by its index from 0.
-    pub(in crate::data::ready_made) fn field(&self, name: &str) -> Option<&Self> {
+    pub(crate) fn field(&self, name: &str) -> Option<&Self> {
         if let Self::List(cells) = self {
             return cells.get(name.parse::<usize>().ok()?);
         }
@@ -173,7 +173,7 @@ impl Cell {
     }
 
     /// Kind of value, for messages.
-    pub(in crate::data::ready_made) fn kind(&self) -> &'static str {
+    pub(crate) fn kind(&self) -> &'static str {
         match self {
             Self::Absent => "nothing",
             Self::Bool(_) => "truth",
@@ -186,7 +186,7 @@ impl Cell {
     }
 
     /// Excerpt of the value with at most about `max` characters, for messages.
-    pub(in crate::data::ready_made) fn excerpt(&self, max: usize) -> String {
+    pub(crate) fn excerpt(&self, max: usize) -> String {
         let whole = match self {
             Self::Absent => String::new(),
             Self::Bool(_) | Self::Number(_) => self.text().unwrap_or_default(),
@@ -254,7 +254,7 @@ fn without_zero_fraction(number: &str) -> String {
 }
 
 /// Decodes a text of base64, or a `data:` URL, that is longer than a name; `None` for other texts.
-pub(in crate::data::ready_made) fn decode_base64(text: &str) -> Option<Vec<u8>> {
+pub(crate) fn decode_base64(text: &str) -> Option<Vec<u8>> {
     let text = text.trim();
     let text = match text.strip_prefix("data:") {
         Some(url) => url.split_once(',')?.1,

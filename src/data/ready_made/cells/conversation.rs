@@ -15,15 +15,15 @@ const ANSWERING: [&str; 4] = ["gpt", "assistant", "model", "bot"];
 
 /// Paths of the first question and its answer in a column of conversations, in the notation of `--map`.
 #[derive(Debug, PartialEq, Eq)]
-pub(in crate::data::ready_made) struct ConversationPaths {
-    pub(in crate::data::ready_made) question: String,
+pub(crate) struct ConversationPaths {
+    pub(crate) question: String,
     /// `None` if the question has no answer.
-    pub(in crate::data::ready_made) answer: Option<String>,
+    pub(crate) answer: Option<String>,
 }
 
 impl ConversationPaths {
     /// Paths in the first column of conversations; `None` if there is no such column.
-    pub(in crate::data::ready_made) fn find(table: &Table) -> Option<Self> {
+    pub(crate) fn find(table: &Table) -> Option<Self> {
         let row = table.rows.first()?;
         table
             .columns
@@ -33,7 +33,7 @@ impl ConversationPaths {
     }
 
     /// Paths in a cell of a column; `None` if the cell is not a conversation.
-    pub(in crate::data::ready_made) fn from_cell(column: &str, cell: &Cell) -> Option<Self> {
+    pub(crate) fn from_cell(column: &str, cell: &Cell) -> Option<Self> {
         let cell = cell.parsed().map_or(Cow::Borrowed(cell), Cow::Owned);
         let Cell::List(turns) = &*cell else {
             return None;

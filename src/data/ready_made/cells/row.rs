@@ -16,51 +16,51 @@ const MAX_COLUMNS: usize = 4096;
 
 /// Maximum number of rows of a set (chosen): a row takes half a kilobyte of memory, and a compressed file of a few kilobytes can have
 /// millions of rows.
-pub(in crate::data::ready_made) const MAX_ROWS: usize = 1_000_000;
+pub(crate) const MAX_ROWS: usize = 1_000_000;
 
 /// Maximum memory for all rows of a set without its images, in bytes (chosen).
 const MAX_TABLE_BYTES: usize = 1 << 30;
 
 /// All rows of a set, in the order of its files.
 #[derive(Debug, Default)]
-pub(in crate::data::ready_made) struct Table {
-    pub(in crate::data::ready_made) files: Vec<FileLabel>,
-    pub(in crate::data::ready_made) columns: Vec<String>,
+pub(crate) struct Table {
+    pub(crate) files: Vec<FileLabel>,
+    pub(crate) columns: Vec<String>,
     /// Index of each column by its name.
     column_indices: HashMap<String, usize>,
     field_names: FieldNames,
     /// Whether the last file has each column.
     in_last_file: Vec<bool>,
-    pub(in crate::data::ready_made) rows: Vec<Row>,
+    pub(crate) rows: Vec<Row>,
     /// Memory of all rows, in bytes.
     bytes: usize,
     /// Messages about changes to the rows.
-    pub(in crate::data::ready_made) notes: Vec<String>,
+    pub(crate) notes: Vec<String>,
 }
 
 /// Name and configuration of a file of rows.
 #[derive(Debug, Clone)]
-pub(in crate::data::ready_made) struct FileLabel {
+pub(crate) struct FileLabel {
     /// Path of the file, for messages. For a file in an archive, it starts with the path of the archive.
-    pub(in crate::data::ready_made) path: PathBuf,
+    pub(crate) path: PathBuf,
     /// Folder of the file inside its archive; `None` outside archives.
-    pub(in crate::data::ready_made) inner: Option<PathBuf>,
+    pub(crate) inner: Option<PathBuf>,
     /// Configuration of the repository; empty if there is none.
-    pub(in crate::data::ready_made) config: String,
+    pub(crate) config: String,
 }
 
 /// One row. Trailing absent cells are not stored.
 #[derive(Debug)]
-pub(in crate::data::ready_made) struct Row {
+pub(crate) struct Row {
     /// Index of its file in [`Table::files`].
-    pub(in crate::data::ready_made) file: usize,
-    pub(in crate::data::ready_made) place: RowPlace,
+    pub(crate) file: usize,
+    pub(crate) place: RowPlace,
     cells: Box<[Cell]>,
 }
 
 /// Position of a row in its file. Rarely used parts are boxed to save memory, because sets have up to a million rows.
 #[derive(Debug, Clone)]
-pub(in crate::data::ready_made) enum RowPlace {
+pub(crate) enum RowPlace {
     /// Record of a CSV or TSV file.
     Record(Position),
     /// Value in a JSON file.
@@ -88,7 +88,7 @@ pub(in crate::data::ready_made) enum RowPlace {
 
 /// Part of a JSON file that is one row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::data::ready_made) enum JsonUnit {
+pub(crate) enum JsonUnit {
     Line,
     Object,
 }
@@ -125,13 +125,13 @@ impl fmt::Display for RowPlace {
 
 impl Table {
     /// Starts the rows of another file.
-    pub(in crate::data::ready_made) fn begin_file(&mut self, file: FileLabel) {
+    pub(crate) fn begin_file(&mut self, file: FileLabel) {
         self.files.push(file);
         self.in_last_file.clear();
     }
 
     /// Columns of the last file.
-    pub(in crate::data::ready_made) fn columns_of_last_file(&self) -> BTreeSet<String> {
+    pub(crate) fn columns_of_last_file(&self) -> BTreeSet<String> {
         self.columns
             .iter()
             .zip(&self.in_last_file)
@@ -152,7 +152,7 @@ impl Table {
     ///
     /// # Errors
     /// If there are more than [`MAX_COLUMNS`].
-    pub(in crate::data::ready_made) fn add_column(&mut self, name: &str) -> Result<usize, String> {
+    pub(crate) fn add_column(&mut self, name: &str) -> Result<usize, String> {
         if let Some(&index) = self.column_indices.get(name) {
             return Ok(self.mark_in_last_file(index));
         }
@@ -168,7 +168,7 @@ impl Table {
     }
 
     /// Index of the column with this name.
-    pub(in crate::data::ready_made) fn find(&self, name: &str) -> Option<usize> {
+    pub(crate) fn find(&self, name: &str) -> Option<usize> {
         self.column_indices.get(name).copied()
     }
 
@@ -176,7 +176,7 @@ impl Table {
     ///
     /// # Errors
     /// If there are more rows than [`MAX_ROWS`], or more bytes than [`MAX_TABLE_BYTES`].
-    pub(in crate::data::ready_made) fn push(
+    pub(crate) fn push(
         &mut self,
         place: RowPlace,
         cells: Vec<(usize, Cell)>,
@@ -209,10 +209,7 @@ impl Table {
     }
 
     /// Parses JSON in the cells of text columns that a map addresses by a path, such as `turns.0.value`.
-    pub(in crate::data::ready_made) fn parse_cells<'m>(
-        &mut self,
-        maps: impl Iterator<Item = &'m ColumnMap>,
-    ) {
+    pub(crate) fn parse_cells<'m>(&mut self, maps: impl Iterator<Item = &'m ColumnMap>) {
         let columns: BTreeSet<usize> = maps
             .flat_map(|map| &map.entries)
             .flat_map(|entry| &entry.columns)
@@ -232,7 +229,7 @@ impl Table {
     }
 
     /// Frees the memory of columns that are not read again.
-    pub(in crate::data::ready_made) fn clear_columns(&mut self, columns: &BTreeSet<usize>) {
+    pub(crate) fn clear_columns(&mut self, columns: &BTreeSet<usize>) {
         for row in &mut self.rows {
             for column in columns {
                 if let Some(cell) = row.cells.get_mut(*column) {
@@ -246,11 +243,7 @@ impl Table {
     ///
     /// # Errors
     /// As [`Self::add_column`].
-    pub(in crate::data::ready_made) fn add_ids(
-        &mut self,
-        from: usize,
-        ids: Vec<String>,
-    ) -> Result<(), String> {
+    pub(crate) fn add_ids(&mut self, from: usize, ids: Vec<String>) -> Result<(), String> {
         let names = known_names(Role::Id);
         if self
             .columns
@@ -272,13 +265,13 @@ impl Table {
     }
 
     /// File and position of a row, for messages.
-    pub(in crate::data::ready_made) fn place(&self, row: usize) -> String {
+    pub(crate) fn place(&self, row: usize) -> String {
         let row = &self.rows[row];
         format!("{}, {}", self.files[row.file].path.display(), row.place)
     }
 
     /// As [`Self::place`], but without the file if the set has only one, for messages that begin with the file of the set.
-    pub(in crate::data::ready_made) fn place_in_set(&self, row: usize) -> String {
+    pub(crate) fn place_in_set(&self, row: usize) -> String {
         match &*self.files {
             [_] => self.rows[row].place.to_string(),
             _ => self.place(row),
@@ -287,7 +280,7 @@ impl Table {
 }
 
 /// Error message for a set with too many rows.
-pub(in crate::data::ready_made) fn too_many_rows() -> String {
+pub(crate) fn too_many_rows() -> String {
     format!(
         "more than {MAX_ROWS} rows, which are not read; write a part of them to a file of its own"
     )
@@ -295,7 +288,7 @@ pub(in crate::data::ready_made) fn too_many_rows() -> String {
 
 impl Row {
     /// Cell of a column; [`Cell::Absent`] if the row does not have it.
-    pub(in crate::data::ready_made) fn cell(&self, column: usize) -> &Cell {
+    pub(crate) fn cell(&self, column: usize) -> &Cell {
         self.cells.get(column).unwrap_or(&Cell::Absent)
     }
 }

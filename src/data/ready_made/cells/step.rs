@@ -5,7 +5,7 @@ use super::text_list::parse_list;
 
 /// Step of the path from a cell to a value inside it.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub(in crate::data::ready_made) enum Step {
+pub(crate) enum Step {
     /// Item of a list, or of a text with a list.
     Item(usize),
     /// Field of a struct.
@@ -14,7 +14,7 @@ pub(in crate::data::ready_made) enum Step {
 
 impl Cell {
     /// Value at the end of a path; `None` if there is none.
-    pub(in crate::data::ready_made) fn value_at(&self, steps: &[Step]) -> Option<Self> {
+    pub(crate) fn value_at(&self, steps: &[Step]) -> Option<Self> {
         let Some((step, rest)) = steps.split_first() else {
             return Some(self.clone());
         };

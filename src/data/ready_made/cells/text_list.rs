@@ -5,7 +5,7 @@ use serde_json::Value;
 use super::python_list::{python_dict, python_list};
 
 /// Parses a list in JSON, or else in the notation of Python or NumPy; `None` if the text is not a list of scalars.
-pub(in crate::data::ready_made) fn parse_list(text: &str) -> Option<Vec<String>> {
+pub(crate) fn parse_list(text: &str) -> Option<Vec<String>> {
     let text = text.trim();
     if !text.starts_with(['[', '(']) || !has_few_values(text) {
         return None;
@@ -18,9 +18,7 @@ pub(in crate::data::ready_made) fn parse_list(text: &str) -> Option<Vec<String>>
 
 /// Parses an object in JSON, or else a dictionary in Python's notation, to names and values; `None` if the text is not an object of
 /// scalars. A value is `None` if it is null.
-pub(in crate::data::ready_made) fn parse_object(
-    text: &str,
-) -> Option<Vec<(String, Option<String>)>> {
+pub(crate) fn parse_object(text: &str) -> Option<Vec<(String, Option<String>)>> {
     let text = text.trim();
     if !text.starts_with('{') || !has_few_values(text) {
         return None;

@@ -6,7 +6,7 @@ use crate::types::questions::letter;
 
 /// How an answer identifies a choice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(in crate::data::ready_made) enum AnswerFormat {
+pub(crate) enum AnswerFormat {
     /// Letter of the choice: `A`, `(a)` or `A.`. A lower-case letter needs a bracket, full stop or colon.
     Letter,
     /// Text of the choice, ignoring letter case, surrounding space and a final full stop.
@@ -18,11 +18,10 @@ pub(in crate::data::ready_made) enum AnswerFormat {
 }
 
 impl AnswerFormat {
-    pub(in crate::data::ready_made) const ALL: [Self; 4] =
-        [Self::Letter, Self::Text, Self::Index0, Self::Index1];
+    pub(crate) const ALL: [Self; 4] = [Self::Letter, Self::Text, Self::Index0, Self::Index1];
 
     /// Name in `--map` and messages.
-    pub(in crate::data::ready_made) fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Letter => "letter",
             Self::Text => "text",
@@ -31,16 +30,12 @@ impl AnswerFormat {
         }
     }
 
-    pub(in crate::data::ready_made) fn from_name(name: &str) -> Option<Self> {
+    pub(crate) fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|format| format.name() == name)
     }
 
     /// Index of the choice that the answer identifies; `None` if it identifies none.
-    pub(in crate::data::ready_made) fn choice_index(
-        self,
-        answer: &str,
-        options: &OptionList,
-    ) -> Option<usize> {
+    pub(crate) fn choice_index(self, answer: &str, options: &OptionList) -> Option<usize> {
         let answer = answer.trim();
         match self {
             Self::Letter => {
@@ -81,11 +76,7 @@ impl AnswerFormat {
 
     /// Like [`Self::choice_index`], for a format that the user did not choose: numbers do not identify options that the text of the
     /// question lists by letter.
-    pub(in crate::data::ready_made) fn inferred_choice_index(
-        self,
-        answer: &str,
-        options: &OptionList,
-    ) -> Option<usize> {
+    pub(crate) fn inferred_choice_index(self, answer: &str, options: &OptionList) -> Option<usize> {
         let is_number = matches!(self, Self::Index0 | Self::Index1);
         if is_number && options.origin == OptionOrigin::Question {
             return None;
@@ -185,7 +176,7 @@ pub(super) fn find_format(rows: &[RowAnswer<'_>]) -> FormatSearch {
 }
 
 /// Index of the choice of a yes/no question that the answer identifies: 0 for yes, 1 for no.
-pub(in crate::data::ready_made) fn yes_no_index(answer: &str) -> Option<usize> {
+pub(crate) fn yes_no_index(answer: &str) -> Option<usize> {
     match &*normalize_text(answer) {
         "yes" | "true" => Some(0),
         "no" | "false" => Some(1),
@@ -194,7 +185,7 @@ pub(in crate::data::ready_made) fn yes_no_index(answer: &str) -> Option<usize> {
 }
 
 /// Index of the choice of a yes/no question that a digit identifies: 0 (yes) for the digit 1, 1 (no) for the digit 0.
-pub(in crate::data::ready_made) fn digit_index(answer: &str) -> Option<usize> {
+pub(crate) fn digit_index(answer: &str) -> Option<usize> {
     match parse_index(answer.trim()) {
         Some(1) => Some(0),
         Some(0) => Some(1),

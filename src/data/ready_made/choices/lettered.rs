@@ -20,7 +20,7 @@ struct Mark {
 
 /// Options with letters in the text of a question.
 #[derive(Debug, PartialEq, Eq)]
-pub(in crate::data::ready_made) enum LetteredOptions {
+pub(crate) enum LetteredOptions {
     /// The text has no options.
     None,
     Found {
@@ -46,7 +46,7 @@ static INSTRUCTION: LazyLock<Option<Regex>> = LazyLock::new(|| {
 /// The options follow the last sequence of at least two marks A, B, … in order. Each option has a letter or a digit. A mark is at the
 /// start, or after space, a comma, a semicolon or a colon. If the other options have one line each, the last option ends with its line,
 /// and the rest belongs to the question.
-pub(in crate::data::ready_made) fn find_in_question(text: &str) -> LetteredOptions {
+pub(crate) fn find_in_question(text: &str) -> LetteredOptions {
     let (body, _) = split_instructions(text);
     let tail = text[body.len()..].trim();
     let marks = marks(body);

@@ -8,7 +8,7 @@ mod truths;
 
 pub(super) use answer_format::{AnswerFormat, digit_index, yes_no_index};
 pub(super) use lettered::{LetteredOptions, find_in_question};
-pub(in crate::data) use option_list::one_line;
+pub(crate) use option_list::one_line;
 pub(super) use option_list::{OptionInterner, OptionList};
 pub(super) use options::Options;
 pub(super) use truths::{ParsedQuestion, find_truths, is_native_format};

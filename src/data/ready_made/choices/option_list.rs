@@ -7,8 +7,8 @@ use crate::types::text::excerpt;
 
 /// Options of a row.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
-pub(in crate::data::ready_made) struct OptionList {
-    pub(in crate::data::ready_made) texts: Arc<[String]>,
+pub(crate) struct OptionList {
+    pub(crate) texts: Arc<[String]>,
     /// Position of each option among its columns, which its letter or number refers to: if B is empty, C is still C.
     pub(super) positions: Vec<usize>,
     pub(super) origin: OptionOrigin,
@@ -24,7 +24,7 @@ pub(super) enum OptionOrigin {
 }
 
 /// Joins the lines of a text with spaces and trims it, because a prompt has one line for each option.
-pub(in crate::data) fn one_line(text: &str) -> String {
+pub(crate) fn one_line(text: &str) -> String {
     let breaks = [
         '\n', '\r', '\u{b}', '\u{c}', '\u{85}', '\u{2028}', '\u{2029}',
     ];
@@ -52,7 +52,7 @@ impl OptionList {
     }
 
     /// Options in the text of a question, in order.
-    pub(in crate::data::ready_made) fn from_question(texts: &[String]) -> Self {
+    pub(crate) fn from_question(texts: &[String]) -> Self {
         Self {
             origin: OptionOrigin::Question,
             ..Self::from_list(texts)
@@ -67,10 +67,10 @@ impl OptionList {
 
 /// Stores equal options of different rows once.
 #[derive(Debug, Default)]
-pub(in crate::data::ready_made) struct OptionInterner(HashSet<Arc<OptionList>>);
+pub(crate) struct OptionInterner(HashSet<Arc<OptionList>>);
 
 impl OptionInterner {
-    pub(in crate::data::ready_made) fn intern(&mut self, options: OptionList) -> Arc<OptionList> {
+    pub(crate) fn intern(&mut self, options: OptionList) -> Arc<OptionList> {
         if let Some(known) = self.0.get(&options) {
             return Arc::clone(known);
         }

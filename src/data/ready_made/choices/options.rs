@@ -12,7 +12,7 @@ use crate::types::text::excerpt;
 
 /// The answer options in the columns of a row.
 #[derive(Debug, PartialEq, Eq)]
-pub(in crate::data::ready_made) enum Options {
+pub(crate) enum Options {
     /// No column has options.
     None,
     /// The options; if several columns have options, all have the same texts.
@@ -25,7 +25,7 @@ pub(in crate::data::ready_made) enum Options {
 
 impl Options {
     /// Reads the options of a row from the columns that have this role.
-    pub(in crate::data::ready_made) fn from_row(row: &Row, roles: &Roles) -> Self {
+    pub(crate) fn from_row(row: &Row, roles: &Roles) -> Self {
         let mut found: Vec<(String, OptionList)> = Vec::new();
         let (texts, positions): (Vec<String>, Vec<usize>) = roles
             .option_cells

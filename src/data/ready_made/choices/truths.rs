@@ -17,19 +17,19 @@ use crate::types::text::{counted, excerpt};
 
 /// Question of a row with its choices, including the correct one.
 #[derive(Debug)]
-pub(in crate::data::ready_made) struct ParsedQuestion {
+pub(crate) struct ParsedQuestion {
     /// Index of the row in the table.
-    pub(in crate::data::ready_made) row: usize,
-    pub(in crate::data::ready_made) text: String,
-    pub(in crate::data::ready_made) choices: Choices,
+    pub(crate) row: usize,
+    pub(crate) text: String,
+    pub(crate) choices: Choices,
 }
 
 /// Questions of a set with their correct options.
 #[derive(Debug, Default)]
-pub(in crate::data::ready_made) struct Truths {
-    pub(in crate::data::ready_made) questions: Vec<ParsedQuestion>,
+pub(crate) struct Truths {
+    pub(crate) questions: Vec<ParsedQuestion>,
     /// Answer columns with their formats as text, for the summary.
-    pub(in crate::data::ready_made) columns: Vec<String>,
+    pub(crate) columns: Vec<String>,
 }
 
 /// Minimum share of questions that begin with a verb, as yes/no questions do (heuristic). Below it, 0 and 1 do not mean no and yes.
@@ -41,7 +41,7 @@ const MIN_VERB_SHARE: f64 = 0.9;
 ///
 /// # Errors
 /// If there are no answers, no format fits any row, or two formats fit but identify different options.
-pub(in crate::data::ready_made) fn find_truths(
+pub(crate) fn find_truths(
     table: &Table,
     roles: &Roles,
     format: &CellFormat,
@@ -107,7 +107,7 @@ fn letters_are_not_options(table: &Table, roles: &Roles, item: &Item) -> bool {
 }
 
 /// True if the table is in this program's own format, in which the answer is the text of a choice.
-pub(in crate::data::ready_made) fn is_native_format(table: &Table) -> bool {
+pub(crate) fn is_native_format(table: &Table) -> bool {
     const FIELDS: [&str; 11] = [
         "id",
         "frame",

@@ -41,7 +41,7 @@ fn column_answers(table: &Table, items: &[Item], column: &Column) -> Vec<Option<
 ///
 /// # Errors
 /// If two columns have different answers for a row; the error shows the row and the flags to choose a column.
-pub(in crate::data::ready_made) fn option_column<'a>(
+pub(crate) fn option_column<'a>(
     table: &Table,
     roles: &'a Roles,
     items: &[Item],
@@ -88,11 +88,7 @@ fn option_candidate<'a>(
 
 /// Flag for a column without a role whose cells identify an option in every row, in the first format that fits; `None` if there is no
 /// such column.
-pub(in crate::data::ready_made) fn suggest_column(
-    table: &Table,
-    roles: &Roles,
-    items: &[Item],
-) -> Option<String> {
+pub(crate) fn suggest_column(table: &Table, roles: &Roles, items: &[Item]) -> Option<String> {
     let none = OptionList::default();
     for (index, name) in table.columns.iter().enumerate() {
         if roles.uses(index) {
@@ -117,7 +113,7 @@ pub(in crate::data::ready_made) fn suggest_column(
 ///
 /// # Errors
 /// As [`option_column`].
-pub(in crate::data::ready_made) fn yes_or_no_column<'a>(
+pub(crate) fn yes_or_no_column<'a>(
     table: &Table,
     roles: &'a Roles,
     items: &[Item],

@@ -4,18 +4,18 @@ use crate::data::ready_made::cells::{Cell, Row};
 
 /// A column, or a field of the structs in it.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(in crate::data::ready_made) struct Column {
+pub(crate) struct Column {
     /// Index in the table.
-    pub(in crate::data::ready_made) index: usize,
+    pub(crate) index: usize,
     /// Path of the field, with dots; `None` for the whole cell.
-    pub(in crate::data::ready_made) field: Option<String>,
+    pub(crate) field: Option<String>,
     /// Name for messages, with the field.
-    pub(in crate::data::ready_made) name: String,
+    pub(crate) name: String,
 }
 
 impl Column {
     /// A whole column.
-    pub(in crate::data::ready_made) fn new(index: usize, name: &str) -> Self {
+    pub(crate) fn new(index: usize, name: &str) -> Self {
         Self {
             index,
             field: None,
@@ -33,7 +33,7 @@ impl Column {
     }
 
     /// Cell of the column in a row.
-    pub(in crate::data::ready_made) fn cell<'a>(&self, row: &'a Row) -> &'a Cell {
+    pub(crate) fn cell<'a>(&self, row: &'a Row) -> &'a Cell {
         let cell = row.cell(self.index);
         match &self.field {
             None => cell,
@@ -45,7 +45,7 @@ impl Column {
     }
 
     /// Cell of a row as text; `None` if it is absent or has no text.
-    pub(in crate::data::ready_made) fn text(&self, row: &Row) -> Option<String> {
+    pub(crate) fn text(&self, row: &Row) -> Option<String> {
         let cell = self.cell(row);
         if cell.is_absent() { None } else { cell.text() }
     }

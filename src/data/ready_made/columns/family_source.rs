@@ -7,7 +7,7 @@ use crate::data::ready_made::choices::ParsedQuestion;
 
 /// Source of the family of each question.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(in crate::data::ready_made) enum FamilySource {
+pub(crate) enum FamilySource {
     Column(Column),
     /// The configuration of the repository that has the row.
     Configuration,
@@ -17,7 +17,7 @@ pub(in crate::data::ready_made) enum FamilySource {
 impl FamilySource {
     /// Chooses the column given by the user. Without one: the first candidate with more than one value among the questions, else the
     /// configuration if there are several, else the first candidate.
-    pub(in crate::data::ready_made) fn choose(
+    pub(crate) fn choose(
         table: &Table,
         families: &FamilyColumns,
         questions: &[ParsedQuestion],
@@ -49,7 +49,7 @@ impl FamilySource {
     }
 
     /// Name of the family of a row: the cell of the column, else the configuration; `None` if both are empty.
-    pub(in crate::data::ready_made) fn family(&self, table: &Table, row: &Row) -> Option<String> {
+    pub(crate) fn family(&self, table: &Table, row: &Row) -> Option<String> {
         if let Self::Column(column) = self
             && let Some(text) = column.text(row)
         {
@@ -60,7 +60,7 @@ impl FamilySource {
     }
 
     /// Description for the summary.
-    pub(in crate::data::ready_made) fn description(&self) -> String {
+    pub(crate) fn description(&self) -> String {
         match self {
             Self::Column(column) => format!("column {}", column.name),
             Self::Configuration => "by configuration".to_owned(),

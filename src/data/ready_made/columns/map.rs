@@ -11,23 +11,23 @@ use crate::types::shell_word;
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct ColumnMap {
     text: String,
-    pub(in crate::data::ready_made) entries: Vec<MapEntry>,
+    pub(crate) entries: Vec<MapEntry>,
 }
 
 /// One `role=column` entry of a map.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(in crate::data::ready_made) struct MapEntry {
+pub(crate) struct MapEntry {
     pub(super) role: Role,
     /// One column, several (for options or images) or a template with `{Column}`; empty turns the role off.
-    pub(in crate::data::ready_made) columns: Vec<String>,
+    pub(crate) columns: Vec<String>,
     /// Text of `columns` before it was split at commas. A column with exactly this name takes precedence.
     pub(super) unsplit: String,
-    pub(in crate::data::ready_made) format: CellFormat,
+    pub(crate) format: CellFormat,
 }
 
 /// Format of the cells in a column.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(in crate::data::ready_made) enum CellFormat {
+pub(crate) enum CellFormat {
     /// Not given, to be inferred.
     Inferred,
     /// Options in one cell, separated by this text.
@@ -37,11 +37,7 @@ pub(in crate::data::ready_made) enum CellFormat {
 }
 
 /// Writes a `--map` flag for one column, quoted for the shell, with the format of answers if one is given.
-pub(in crate::data::ready_made) fn map_flag(
-    role: Role,
-    column: &str,
-    format: Option<AnswerFormat>,
-) -> String {
+pub(crate) fn map_flag(role: Role, column: &str, format: Option<AnswerFormat>) -> String {
     let suffix = match format {
         Some(format) => format!(":{}", format.name()),
         // A colon ends a column name that contains colons: the text after the last colon is the format, and an empty one is inferred.
@@ -56,7 +52,7 @@ pub(in crate::data::ready_made) fn map_flag(
 
 impl ColumnMap {
     /// Merges maps. An entry replaces earlier ones of the same role.
-    pub(in crate::data::ready_made) fn merge<'a>(maps: impl IntoIterator<Item = &'a Self>) -> Self {
+    pub(crate) fn merge<'a>(maps: impl IntoIterator<Item = &'a Self>) -> Self {
         let mut merged = Self::default();
         for map in maps {
             for entry in &map.entries {
@@ -68,7 +64,7 @@ impl ColumnMap {
     }
 
     /// Entry of a role; `None` if the map does not have the role.
-    pub(in crate::data::ready_made) fn entry(&self, role: Role) -> Option<&MapEntry> {
+    pub(crate) fn entry(&self, role: Role) -> Option<&MapEntry> {
         self.entries.iter().find(|entry| entry.role == role)
     }
 }

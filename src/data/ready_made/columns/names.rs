@@ -12,7 +12,7 @@ const COLUMNS: &str = include_str!("../columns.toml");
 /// Role of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub(in crate::data::ready_made) enum Role {
+pub(crate) enum Role {
     Question,
     Image,
     Options,
@@ -82,7 +82,7 @@ static ENDINGS: LazyLock<Vec<Regex>> = LazyLock::new(|| {
 });
 
 /// Known column names of a role, normalized, in order of preference.
-pub(in crate::data::ready_made) fn known_names(role: Role) -> &'static [String] {
+pub(crate) fn known_names(role: Role) -> &'static [String] {
     KNOWN
         .as_ref()
         .and_then(|known| known.roles.get(&role))
@@ -90,7 +90,7 @@ pub(in crate::data::ready_made) fn known_names(role: Role) -> &'static [String] 
 }
 
 /// Normalizes a name: only letters and digits, in lower case.
-pub(in crate::data::ready_made) fn normalize(name: &str) -> String {
+pub(crate) fn normalize(name: &str) -> String {
     name.chars()
         .filter(|c| c.is_alphanumeric())
         .flat_map(char::to_lowercase)
@@ -98,7 +98,7 @@ pub(in crate::data::ready_made) fn normalize(name: &str) -> String {
 }
 
 /// Splits the instructions off the end of a text. Returns the rest and the instructions, the last one first.
-pub(in crate::data::ready_made) fn split_instructions(text: &str) -> (&str, Vec<String>) {
+pub(crate) fn split_instructions(text: &str) -> (&str, Vec<String>) {
     let (mut text, mut instructions) = (text.trim_end(), Vec::new());
     loop {
         let instruction = ENDINGS

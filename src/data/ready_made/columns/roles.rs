@@ -13,27 +13,27 @@ use crate::types::text::excerpt;
 
 /// Columns by role. If a role has several columns, they are in order of preference.
 #[derive(Debug)]
-pub(in crate::data::ready_made) struct Roles {
-    pub(in crate::data::ready_made) question: QuestionSource,
-    pub(in crate::data::ready_made) images: ImageColumns,
+pub(crate) struct Roles {
+    pub(crate) question: QuestionSource,
+    pub(crate) images: ImageColumns,
     /// Columns with all options of a row in one cell.
-    pub(in crate::data::ready_made) option_lists: Vec<Column>,
+    pub(crate) option_lists: Vec<Column>,
     /// Columns with one option each, in order.
-    pub(in crate::data::ready_made) option_cells: Vec<Column>,
-    pub(in crate::data::ready_made) answers: Vec<Column>,
-    pub(in crate::data::ready_made) ids: Vec<Column>,
-    pub(in crate::data::ready_made) hint: Option<Column>,
-    pub(in crate::data::ready_made) families: FamilyColumns,
-    pub(in crate::data::ready_made) evidence: Option<Column>,
-    pub(in crate::data::ready_made) scene: Option<Column>,
+    pub(crate) option_cells: Vec<Column>,
+    pub(crate) answers: Vec<Column>,
+    pub(crate) ids: Vec<Column>,
+    pub(crate) hint: Option<Column>,
+    pub(crate) families: FamilyColumns,
+    pub(crate) evidence: Option<Column>,
+    pub(crate) scene: Option<Column>,
     /// Text between the options in one cell, if given by the user.
-    pub(in crate::data::ready_made) option_separator: Option<String>,
-    pub(in crate::data::ready_made) in_question: OptionsInQuestion,
+    pub(crate) option_separator: Option<String>,
+    pub(crate) in_question: OptionsInQuestion,
 }
 
 /// Source of the text of a question.
 #[derive(Debug)]
-pub(in crate::data::ready_made) enum QuestionSource {
+pub(crate) enum QuestionSource {
     Column(Column),
     /// The question is in the image, according to the user. The prompt only refers to it.
     Image,
@@ -41,10 +41,10 @@ pub(in crate::data::ready_made) enum QuestionSource {
 
 impl QuestionSource {
     /// Text of a question that is in its image.
-    pub(in crate::data::ready_made) const IN_IMAGE_TEXT: &str = "Answer the question in the image.";
+    pub(crate) const IN_IMAGE_TEXT: &str = "Answer the question in the image.";
 
     /// Column of the text; `None` if the question is in the image.
-    pub(in crate::data::ready_made) fn column(&self) -> Option<&Column> {
+    pub(crate) fn column(&self) -> Option<&Column> {
         match self {
             Self::Column(column) => Some(column),
             Self::Image => None,
@@ -54,7 +54,7 @@ impl QuestionSource {
 
 /// Columns of the families.
 #[derive(Debug)]
-pub(in crate::data::ready_made) enum FamilyColumns {
+pub(crate) enum FamilyColumns {
     /// Candidates by their names, in order of preference.
     Candidates(Vec<Column>),
     /// Column given by the user, or none.
@@ -72,7 +72,7 @@ impl FamilyColumns {
 
 /// Treatment of options in the text of a question, if the row has no columns of options.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::data::ready_made) enum OptionsInQuestion {
+pub(crate) enum OptionsInQuestion {
     Search,
     /// There are no options, according to the user.
     None,
@@ -80,7 +80,7 @@ pub(in crate::data::ready_made) enum OptionsInQuestion {
 
 /// Columns of the images.
 #[derive(Debug)]
-pub(in crate::data::ready_made) enum ImageColumns {
+pub(crate) enum ImageColumns {
     /// The first of these columns with an image.
     First(Vec<Column>),
     /// All of these columns.
@@ -94,7 +94,7 @@ impl Roles {
     ///
     /// # Errors
     /// If a column of the map does not exist, there is no question column, or a row has several questions.
-    pub(in crate::data::ready_made) fn new(table: &Table, map: &ColumnMap) -> Result<Self, String> {
+    pub(crate) fn new(table: &Table, map: &ColumnMap) -> Result<Self, String> {
         let question = columns_of(table, map, Role::Question)?;
         refuse_several_questions(table, map)?;
         let question = match (question.into_iter().next(), map.entry(Role::Question)) {
@@ -161,7 +161,7 @@ impl Roles {
     }
 
     /// Columns that are not read again after the questions are parsed. Images, ids, families, evidence and scenes are read later.
-    pub(in crate::data::ready_made) fn columns_to_clear(&self) -> BTreeSet<usize> {
+    pub(crate) fn columns_to_clear(&self) -> BTreeSet<usize> {
         let (ImageColumns::First(images) | ImageColumns::All(images)) = &self.images else {
             // A template may name any column.
             return BTreeSet::new();
@@ -335,10 +335,7 @@ pub(crate) fn embedded_images(table: &Table) -> Option<Column> {
 ///
 /// # Errors
 /// If there is no such column; the error lists the columns.
-pub(in crate::data::ready_made) fn find_column(
-    table: &Table,
-    name: &str,
-) -> Result<Column, String> {
+pub(crate) fn find_column(table: &Table, name: &str) -> Result<Column, String> {
     if let Some(index) = table.find(name) {
         return Ok(Column::new(index, name));
     }
@@ -434,7 +431,7 @@ const MAX_VALUES_LENGTH: usize = 360;
 const MAX_LISTED_NAME: usize = 40;
 
 /// Lists the columns with their kinds and an example value, one per line.
-pub(in crate::data::ready_made) fn describe_columns(table: &Table) -> String {
+pub(crate) fn describe_columns(table: &Table) -> String {
     let width = table.columns.iter().map(|name| name.chars().count()).max();
     let width = width.unwrap_or(0).min(24);
     let columns = table.columns.len().clamp(1, MAX_LISTED_COLUMNS);

@@ -8,7 +8,7 @@ const MAX_WIDTH: usize = 64;
 
 /// Name of an image file with columns in braces: `images/{id}.jpg`, or `images/{id:012}.jpg` for a number in twelve digits.
 #[derive(Debug)]
-pub(in crate::data::ready_made) struct Template {
+pub(crate) struct Template {
     text: String,
     parts: Vec<TemplatePart>,
 }
@@ -49,12 +49,12 @@ impl Template {
     }
 
     /// Template as written by the user.
-    pub(in crate::data::ready_made) fn text(&self) -> &str {
+    pub(crate) fn text(&self) -> &str {
         &self.text
     }
 
     /// Fills in the cells of a row; `None` if one is absent.
-    pub(in crate::data::ready_made) fn fill(&self, row: &Row) -> Option<String> {
+    pub(crate) fn fill(&self, row: &Row) -> Option<String> {
         self.parts
             .iter()
             .map(|part| match part {

@@ -29,7 +29,7 @@ const MAX_TEXT_BYTES: u64 = 1 << 22;
 
 /// A ZIP file with its directory in memory.
 pub(crate) struct Archive {
-    pub(in crate::data::ready_made) path: PathBuf,
+    pub(crate) path: PathBuf,
     /// Index of each file, by its name.
     indices: BTreeMap<String, usize>,
     zip: Mutex<ZipArchive<BufReader<BoundedFile>>>,
@@ -120,7 +120,7 @@ impl Archive {
     }
 
     /// Path of the ZIP file.
-    pub(in crate::data) fn path(&self) -> &Path {
+    pub(crate) fn path(&self) -> &Path {
         &self.path
     }
 
@@ -138,7 +138,7 @@ impl Archive {
     }
 
     /// True if the archive has a file with this name.
-    pub(in crate::data::ready_made) fn has(&self, name: &str) -> bool {
+    pub(crate) fn has(&self, name: &str) -> bool {
         self.indices.contains_key(name)
     }
 
@@ -146,7 +146,7 @@ impl Archive {
     ///
     /// # Errors
     /// If it cannot be read or is longer than a gigabyte, whatever size the directory states.
-    pub(in crate::data) fn read_image(&self, name: &str) -> Result<Vec<u8>> {
+    pub(crate) fn read_image(&self, name: &str) -> Result<Vec<u8>> {
         let mut bytes = Vec::new();
         self.copy(name, MAX_IMAGE_BYTES, &mut bytes)?;
         Ok(bytes)
@@ -162,7 +162,7 @@ impl Archive {
     }
 
     /// Reads a short text file.
-    pub(in crate::data::ready_made) fn read_text(&self, name: &str) -> Result<String> {
+    pub(crate) fn read_text(&self, name: &str) -> Result<String> {
         let mut bytes = Vec::new();
         self.copy(name, MAX_TEXT_BYTES, &mut bytes)?;
         Ok(String::from_utf8_lossy(&bytes).into_owned())
@@ -211,11 +211,7 @@ impl Archive {
     ///
     /// # Errors
     /// If the path leads outside the archive, or there is no such file.
-    pub(in crate::data::ready_made) fn find(
-        &self,
-        base: &Path,
-        spelled: &str,
-    ) -> Result<FrameId, String> {
+    pub(crate) fn find(&self, base: &Path, spelled: &str) -> Result<FrameId, String> {
         let mut parts: Vec<String> = Vec::new();
         for part in base.join(spelled).components() {
             let is_inside = match part {

@@ -14,22 +14,22 @@ use crate::error::{Error, Result};
 
 /// Files of a set, and the folders that may have its images.
 #[derive(Debug)]
-pub(in crate::data::ready_made) struct FoundFiles {
-    pub(in crate::data::ready_made) files: Vec<SetFile>,
+pub(crate) struct FoundFiles {
+    pub(crate) files: Vec<SetFile>,
     /// Folder of the set.
-    pub(in crate::data::ready_made) folder: PathBuf,
+    pub(crate) folder: PathBuf,
     /// Further folders that paths may lead to: the files of a hub's cache, or the folders of further `--data` files.
-    pub(in crate::data::ready_made) further: Vec<PathBuf>,
+    pub(crate) further: Vec<PathBuf>,
     /// ZIP file of the set.
-    pub(in crate::data::ready_made) archive: Option<Arc<Archive>>,
+    pub(crate) archive: Option<Arc<Archive>>,
     /// Notes about skipped or missing files.
-    pub(in crate::data::ready_made) notes: Vec<String>,
-    pub(in crate::data::ready_made) joined: Joined,
+    pub(crate) notes: Vec<String>,
+    pub(crate) joined: Joined,
 }
 
 /// Relation of several files to each other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::data::ready_made) enum Joined {
+pub(crate) enum Joined {
     /// Parts of one table, which must have the same columns.
     OneTable,
     /// Files of a folder or a ZIP file, which may have different columns.
@@ -37,7 +37,7 @@ pub(in crate::data::ready_made) enum Joined {
 }
 
 /// True if a folder has a ready-made set, or cannot be scanned.
-pub(in crate::data) fn is_set_folder(folder: &Path) -> bool {
+pub(crate) fn is_set_folder(folder: &Path) -> bool {
     let Ok(tree) = Tree::from_folder(folder) else {
         return true;
     };
@@ -48,10 +48,7 @@ pub(in crate::data) fn is_set_folder(folder: &Path) -> bool {
 ///
 /// # Errors
 /// If there are none, or it is not clear which to use; the error lists the files.
-pub(in crate::data::ready_made) fn find_files(
-    places: &[PathBuf],
-    args: &SetArgs,
-) -> Result<FoundFiles> {
+pub(crate) fn find_files(places: &[PathBuf], args: &SetArgs) -> Result<FoundFiles> {
     match places {
         [place] => files_at(place, args),
         places => named_files(places, args),

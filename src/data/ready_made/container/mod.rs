@@ -26,8 +26,8 @@ use crate::error::{Error, Result};
 use crate::files::reading;
 use crate::types::shell_word;
 
-pub(in crate::data) use archive::Archive;
-pub(in crate::data) use find::is_set_folder;
+pub(crate) use archive::Archive;
+pub(crate) use find::is_set_folder;
 pub(super) use find::{FoundFiles, Joined, find_files};
 pub(crate) use parquet_columns::ParquetColumns;
 pub(crate) use tree::cached_snapshot;
@@ -38,7 +38,7 @@ const SUPPORTED: &str =
 
 /// One file of a table.
 #[derive(Debug)]
-pub(in crate::data) struct SetFile {
+pub(crate) struct SetFile {
     pub(super) label: FileLabel,
     kind: FileKind,
     /// Decompressed copy of a compressed file, deleted when dropped.

@@ -9,7 +9,7 @@ use crate::data::ready_made::settings::SetArgs;
 use crate::types::Digest;
 
 /// Pairs of indices of questions with equal digests and different answers. Every contradicted question is in at least one pair.
-pub(in crate::data::ready_made) fn find_contradictions(
+pub(crate) fn find_contradictions(
     questions: &[ParsedQuestion],
     digests: &[Digest],
 ) -> Vec<[usize; 2]> {
@@ -44,7 +44,7 @@ pub(in crate::data::ready_made) fn find_contradictions(
 ///
 /// # Errors
 /// If the user does not allow it; the error names the first pair.
-pub(in crate::data::ready_made) fn omit_contradictions(
+pub(crate) fn omit_contradictions(
     table: &Table,
     args: &SetArgs,
     questions: &mut Vec<ParsedQuestion>,

@@ -7,7 +7,7 @@ use crate::data::ready_made::settings::{SetArgs, SeveralImages};
 
 /// Reason why a row is not asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(in crate::data::ready_made) enum OmissionReason {
+pub(crate) enum OmissionReason {
     SeveralImages,
     NoImage,
     /// The question has no options.
@@ -21,7 +21,7 @@ pub(in crate::data::ready_made) enum OmissionReason {
 
 impl OmissionReason {
     /// Name in the manifest and in messages.
-    pub(in crate::data::ready_made) fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::SeveralImages => "several images",
             Self::NoImage => "no image",
@@ -58,32 +58,26 @@ impl OmissionReason {
 
 /// Number of rows that are not asked, with a description of the first, by reason.
 #[derive(Debug, Default)]
-pub(in crate::data::ready_made) struct Omissions {
+pub(crate) struct Omissions {
     counts: BTreeMap<OmissionReason, (usize, String)>,
 }
 
 impl Omissions {
     /// Adds a row with its problem.
-    pub(in crate::data::ready_made) fn add(
-        &mut self,
-        reason: OmissionReason,
-        problem: impl FnOnce() -> String,
-    ) {
+    pub(crate) fn add(&mut self, reason: OmissionReason, problem: impl FnOnce() -> String) {
         let (count, _) = self.counts.entry(reason).or_insert_with(|| (0, problem()));
         *count += 1;
     }
 
     /// Number of rows left out, by reason.
-    pub(in crate::data::ready_made) fn counts(
-        &self,
-    ) -> impl Iterator<Item = (OmissionReason, usize)> {
+    pub(crate) fn counts(&self) -> impl Iterator<Item = (OmissionReason, usize)> {
         self.counts
             .iter()
             .map(|(reason, (count, _))| (*reason, *count))
     }
 
     /// Number of broken rows, and the problem of the first; `None` if there are none.
-    pub(in crate::data::ready_made) fn bad(&self) -> Option<(usize, &str)> {
+    pub(crate) fn bad(&self) -> Option<(usize, &str)> {
         let (count, first) = self.counts.get(&OmissionReason::Bad)?;
         Some((*count, first))
     }
@@ -92,11 +86,7 @@ impl Omissions {
     ///
     /// # Errors
     /// One line for each reason that is not allowed, with the number of rows, the first row, and the flag that allows it.
-    pub(in crate::data::ready_made) fn check(
-        &self,
-        rows: usize,
-        args: &SetArgs,
-    ) -> Result<(), String> {
+    pub(crate) fn check(&self, rows: usize, args: &SetArgs) -> Result<(), String> {
         let mut problems = Vec::new();
         for (&reason, (count, first)) in &self.counts {
             let head = format!("{count} of {rows} rows");

@@ -37,7 +37,7 @@ pub(super) enum LocatedImage {
 }
 
 /// Names and collects the frames of a set. Equal image data in several cells are one frame, with one noise seed.
-pub(in crate::data::ready_made) struct Frames<'a> {
+pub(crate) struct Frames<'a> {
     pub(super) table: &'a Table,
     root: &'a Root,
     /// ZIP file of the set.
@@ -56,10 +56,10 @@ pub(in crate::data::ready_made) struct Frames<'a> {
 }
 
 /// Images of each row with several, by the name that stands for all of them.
-pub(in crate::data) type Series = BTreeMap<FrameId, Vec<FrameId>>;
+pub(crate) type Series = BTreeMap<FrameId, Vec<FrameId>>;
 
 impl<'a> Frames<'a> {
-    pub(in crate::data::ready_made) fn new(
+    pub(crate) fn new(
         table: &'a Table,
         root: &'a Root,
         archive: Option<&'a Arc<Archive>>,
@@ -180,7 +180,7 @@ impl<'a> Frames<'a> {
     }
 
     /// Error for the first unusable image of a row; `None` if all exist. Files are not opened.
-    pub(in crate::data::ready_made) fn problem(&self, row: usize) -> Option<Error> {
+    pub(crate) fn problem(&self, row: usize) -> Option<Error> {
         self.in_row(row).find_map(|image| match image {
             Err(problem) => Some(problem),
             Ok(LocatedImage::Cell { row, facts, .. }) if facts.format.is_none() => {
@@ -293,10 +293,7 @@ impl<'a> Frames<'a> {
     }
 
     /// Frame of a question, or the name that stands for all frames of a question with several images. Adds their sources.
-    pub(in crate::data::ready_made) fn frame(
-        &mut self,
-        question: &ParsedQuestion,
-    ) -> Result<FrameId> {
+    pub(crate) fn frame(&mut self, question: &ParsedQuestion) -> Result<FrameId> {
         let images: Vec<LocatedImage> = self.in_row(question.row).collect::<Result<_>>()?;
         let frames: Vec<FrameId> = images
             .into_iter()
@@ -365,9 +362,7 @@ impl<'a> Frames<'a> {
     }
 
     /// Takes out the sources of all added frames, and the images of questions with several.
-    pub(in crate::data::ready_made) fn take_sources(
-        &mut self,
-    ) -> (BTreeMap<FrameId, ImageSource>, Series) {
+    pub(crate) fn take_sources(&mut self) -> (BTreeMap<FrameId, ImageSource>, Series) {
         (
             std::mem::take(&mut self.sources),
             std::mem::take(&mut self.series),

@@ -12,7 +12,7 @@ use crate::types::{Digest, FrameId, QuestionId};
 
 /// Ids of the questions of a set.
 #[derive(Debug)]
-pub(in crate::data::ready_made) struct Ids {
+pub(crate) struct Ids {
     texts: Vec<String>,
     source: String,
     note: Option<String>,
@@ -21,22 +21,22 @@ pub(in crate::data::ready_made) struct Ids {
 
 impl Ids {
     /// Pairs of indices of questions that are equal except for their answers.
-    pub(in crate::data::ready_made) fn contradictions(&self) -> &[[usize; 2]] {
+    pub(crate) fn contradictions(&self) -> &[[usize; 2]] {
         &self.contradictions
     }
 
     /// Id of the question with this index.
-    pub(in crate::data::ready_made) fn id(&self, index: usize) -> QuestionId {
+    pub(crate) fn id(&self, index: usize) -> QuestionId {
         QuestionId(self.texts[index].clone())
     }
 
     /// Name of the column of ids, or `content`.
-    pub(in crate::data::ready_made) fn source(&self) -> &str {
+    pub(crate) fn source(&self) -> &str {
         &self.source
     }
 
     /// Note for the user about repeated questions.
-    pub(in crate::data::ready_made) fn note(&self) -> Option<String> {
+    pub(crate) fn note(&self) -> Option<String> {
         self.note.clone()
     }
 }
@@ -52,7 +52,7 @@ enum ImageIdentity {
 
 impl Frames<'_> {
     /// Makes ids for the questions: from the first column with a different value for each, else from their content.
-    pub(in crate::data::ready_made) fn ids(&self, questions: &[ParsedQuestion]) -> Result<Ids> {
+    pub(crate) fn ids(&self, questions: &[ParsedQuestion]) -> Result<Ids> {
         for column in &self.roles.ids {
             let Some(texts) = self.unique_texts(column, questions) else {
                 continue;

@@ -14,7 +14,7 @@ static MARK: LazyLock<Option<Regex>> =
 /// Normalizes the image marks of a row. With one image, marks are removed. With several, the texts of the row must be read in order,
 /// because the k-th mark without a number refers to the k-th image.
 #[derive(Debug)]
-pub(in crate::data::ready_made) struct ImageMarks {
+pub(crate) struct ImageMarks {
     /// Number of images.
     images: usize,
     /// Number of marks without a number so far.
@@ -23,7 +23,7 @@ pub(in crate::data::ready_made) struct ImageMarks {
 }
 
 impl ImageMarks {
-    pub(in crate::data::ready_made) fn new(images: usize) -> Self {
+    pub(crate) fn new(images: usize) -> Self {
         Self {
             images,
             unnumbered: 0,
@@ -35,7 +35,7 @@ impl ImageMarks {
     ///
     /// # Errors
     /// If a mark refers to an image that the row does not have, or only some marks have numbers.
-    pub(in crate::data::ready_made) fn read(&mut self, text: &str) -> Result<String, String> {
+    pub(crate) fn read(&mut self, text: &str) -> Result<String, String> {
         let Some(pattern) = &*MARK else {
             return Ok(text.to_owned());
         };
@@ -73,10 +73,7 @@ impl ImageMarks {
     ///
     /// # Errors
     /// As [`Self::read`].
-    pub(in crate::data::ready_made) fn read_option(
-        &mut self,
-        option: &str,
-    ) -> Result<String, String> {
+    pub(crate) fn read_option(&mut self, option: &str) -> Result<String, String> {
         if self.images == 1 {
             return Ok(option.to_owned());
         }

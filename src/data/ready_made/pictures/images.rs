@@ -13,7 +13,7 @@ use crate::pictures::{DecodeRule, ImageFile};
 
 /// Reference to an image of a row.
 #[derive(Debug, Clone)]
-pub(in crate::data::ready_made) enum RowImage {
+pub(crate) enum RowImage {
     /// Bytes or base64 in a cell.
     Embedded {
         column: usize,
@@ -30,7 +30,7 @@ pub(in crate::data::ready_made) enum RowImage {
 
 /// Content of the image columns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::data::ready_made) enum ImageForm {
+pub(crate) enum ImageForm {
     /// Images, or the paths of files.
     Files,
     /// Names of frames of other data.
@@ -50,7 +50,7 @@ fn named_frame(row: &Row, roles: &Roles) -> Option<RowImage> {
 
 impl ImageForm {
     /// Images of a row, in order.
-    pub(in crate::data::ready_made) fn in_row(self, row: &Row, roles: &Roles) -> Vec<RowImage> {
+    pub(crate) fn in_row(self, row: &Row, roles: &Roles) -> Vec<RowImage> {
         match self {
             Self::Files => images(row, roles),
             Self::Frames => named_frame(row, roles).into_iter().collect(),
@@ -59,7 +59,7 @@ impl ImageForm {
 }
 
 /// Images of a row, in order. If several columns may have the image, the first with image data is preferred to paths.
-pub(in crate::data::ready_made) fn images(row: &Row, roles: &Roles) -> Vec<RowImage> {
+pub(crate) fn images(row: &Row, roles: &Roles) -> Vec<RowImage> {
     let mut found = Vec::new();
     match &roles.images {
         ImageColumns::First(columns) => {
@@ -187,7 +187,7 @@ pub(super) struct CellPart {
 
 impl EmbeddedImage {
     /// Name of the image format, or `other`.
-    pub(in crate::data::ready_made) fn format(&self) -> &'static str {
+    pub(crate) fn format(&self) -> &'static str {
         self.facts.format.map_or("other", FileFormat::name)
     }
 
@@ -195,7 +195,7 @@ impl EmbeddedImage {
     ///
     /// # Errors
     /// If the table cannot be read, or has changed since it was opened.
-    pub(in crate::data) fn read_image(&self, rule: DecodeRule) -> Result<ImageFile> {
+    pub(crate) fn read_image(&self, rule: DecodeRule) -> Result<ImageFile> {
         let place = format!("{}, {}", self.file.label.path.display(), self.row);
         let value = self
             .file

@@ -7,10 +7,10 @@ mod images;
 mod scenes;
 
 pub(super) use frames::Frames;
-pub(in crate::data) use frames::Series;
+pub(crate) use frames::Series;
 pub(super) use ids::Ids;
 pub(super) use image_marks::ImageMarks;
-pub(in crate::data) use images::EmbeddedImage;
+pub(crate) use images::EmbeddedImage;
 pub(super) use images::{ImageForm, images};
-pub(in crate::data) use scenes::SceneNames;
+pub(crate) use scenes::SceneNames;
 pub(super) use scenes::Scenes;

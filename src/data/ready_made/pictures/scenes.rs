@@ -12,11 +12,11 @@ use crate::error::{Error, Result};
 use crate::types::FrameId;
 
 /// Scene of each frame that has one.
-pub(in crate::data) type SceneNames = BTreeMap<FrameId, String>;
+pub(crate) type SceneNames = BTreeMap<FrameId, String>;
 
 /// Collects the scenes of the frames from the column of scenes.
 #[derive(Debug)]
-pub(in crate::data::ready_made) struct Scenes<'a> {
+pub(crate) struct Scenes<'a> {
     column: Option<&'a Column>,
     /// True if the user gave the column, or the table is in this program's own format. Then a frame with two scenes is an error;
     /// otherwise the column is ignored.
@@ -29,11 +29,7 @@ pub(in crate::data::ready_made) struct Scenes<'a> {
 
 impl<'a> Scenes<'a> {
     /// No frames yet.
-    pub(in crate::data::ready_made) fn new(
-        table: &Table,
-        map: &ColumnMap,
-        column: Option<&'a Column>,
-    ) -> Self {
+    pub(crate) fn new(table: &Table, map: &ColumnMap, column: Option<&'a Column>) -> Self {
         Self {
             column,
             is_required: map.entry(Role::Scene).is_some() || is_native_format(table),
@@ -47,12 +43,7 @@ impl<'a> Scenes<'a> {
     ///
     /// # Errors
     /// If the frame already has another scene and the column is required.
-    pub(in crate::data::ready_made) fn add(
-        &mut self,
-        table: &Table,
-        row: usize,
-        frame: &FrameId,
-    ) -> Result<()> {
+    pub(crate) fn add(&mut self, table: &Table, row: usize, frame: &FrameId) -> Result<()> {
         let Some(column) = self.column else {
             return Ok(());
         };
@@ -83,7 +74,7 @@ impl<'a> Scenes<'a> {
     }
 
     /// Takes the scenes out; none if the column has contradictions.
-    pub(in crate::data::ready_made) fn take(&mut self) -> SceneNames {
+    pub(crate) fn take(&mut self) -> SceneNames {
         match self.contradiction {
             None => std::mem::take(&mut self.names),
             Some(_) => SceneNames::new(),
@@ -91,7 +82,7 @@ impl<'a> Scenes<'a> {
     }
 
     /// Note about the column and the number of scenes; `None` without a column.
-    pub(in crate::data::ready_made) fn note(&self) -> Option<String> {
+    pub(crate) fn note(&self) -> Option<String> {
         let name = &self.column?.name;
         if let Some(problem) = &self.contradiction {
             return Some(format!("{name} is not used as the scene: {problem}"));

@@ -17,7 +17,7 @@ fn ceramic(rng: &mut SeededRng) -> (Surface, &'static str) {
 }
 
 /// A sink on a cabinet, with its tap.
-pub(in super::super) fn vanity(rng: &mut SeededRng) -> FurnitureSet {
+pub(crate) fn vanity(rng: &mut SeededRng) -> FurnitureSet {
     let names = ["brown", "brown", "grey", "blue", "green", "black"];
     let paint = Paint::random(&names, rng);
     let base = cabinet_in_paint(
@@ -33,7 +33,7 @@ pub(in super::super) fn vanity(rng: &mut SeededRng) -> FurnitureSet {
 }
 
 /// A bathtub along the wall, open above.
-pub(in super::super) fn bathtub(rng: &mut SeededRng) -> Piece {
+pub(crate) fn bathtub(rng: &mut SeededRng) -> Piece {
     let (white, name) = ceramic(rng);
     let steel = Surface::steel();
     let (length, height, depth) = (rng.between(1.55, 1.75), 0.56, 0.74);

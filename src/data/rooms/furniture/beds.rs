@@ -11,7 +11,7 @@ use super::super::surface::Surface;
 use super::{FurnitureSet, add_legs};
 
 /// A bed with a blanket and one or two pillows.
-pub(in super::super) fn bed(rng: &mut SeededRng) -> FurnitureSet {
+pub(crate) fn bed(rng: &mut SeededRng) -> FurnitureSet {
     let is_double = rng.chance(0.6);
     let width = if is_double {
         rng.between(1.45, 1.7)
@@ -66,7 +66,7 @@ pub(in super::super) fn bed(rng: &mut SeededRng) -> FurnitureSet {
 }
 
 /// A pillow or cushion with its center at the origin, tilted backwards by `lean` radians.
-pub(in super::super) fn pillow(
+pub(crate) fn pillow(
     word: &'static str,
     size: Vec3,
     lean: f32,
@@ -79,7 +79,7 @@ pub(in super::super) fn pillow(
 }
 
 /// A cushion for a sofa or a chair, with its center at the origin.
-pub(in super::super) fn cushion(rng: &mut SeededRng) -> Piece {
+pub(crate) fn cushion(rng: &mut SeededRng) -> Piece {
     let paint = Paint::random(&COMMON_COLORS, rng);
     let mut surface = Surface::fabric(paint, rng);
     let mut name = paint.name;

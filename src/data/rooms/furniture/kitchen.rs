@@ -12,19 +12,19 @@ use super::storage::cabinet_in_paint;
 use super::{FurnitureSet, parts};
 
 /// The height of counters in metres.
-pub(in super::super) const COUNTER: f32 = 0.9;
+pub(crate) const COUNTER: f32 = 0.9;
 const DEPTH: f32 = 0.62;
 
 /// The paints of the cabinets, the counter and the appliances of one kitchen.
 #[derive(Debug, Clone, Copy)]
-pub(in super::super) struct Style {
+pub(crate) struct Style {
     cabinets: Paint,
     counter: Paint,
     appliances: Paint,
 }
 
 impl Style {
-    pub(in super::super) fn new(rng: &mut SeededRng) -> Self {
+    pub(crate) fn new(rng: &mut SeededRng) -> Self {
         let cabinets = [
             "white", "brown", "brown", "blue", "green", "grey", "red", "yellow",
         ];
@@ -37,13 +37,13 @@ impl Style {
     }
 
     /// An appliance of the table of parts in the paint of the kitchen.
-    pub(in super::super) fn appliance(&self, name: &str, rng: &mut SeededRng) -> Piece {
+    pub(crate) fn appliance(&self, name: &str, rng: &mut SeededRng) -> Piece {
         parts::piece_in_paint(name, self.appliances, rng)
     }
 }
 
 /// Cabinets below a counter, with a sink if `sink` is set.
-pub(in super::super) fn base_cabinets(
+pub(crate) fn base_cabinets(
     width: f32,
     sink: bool,
     style: &Style,
@@ -91,7 +91,7 @@ pub(in super::super) fn base_cabinets(
 }
 
 /// Wall cabinets, with their lower edge at y = 0.
-pub(in super::super) fn wall_cabinets(width: f32, style: &Style) -> Piece {
+pub(crate) fn wall_cabinets(width: f32, style: &Style) -> Piece {
     let doors = ((width / 0.45) as usize).max(1);
     cabinet_in_paint(
         kind("kitchen cabinet", "cabinet"),

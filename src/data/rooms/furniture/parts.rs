@@ -225,7 +225,7 @@ fn parse_surface(word: &str, main: Paint, rng: &mut SeededRng) -> Surface {
 }
 
 /// Makes the piece of a name, with a random size in one of its colours. Empty for a name that is not in the table.
-pub(in super::super) fn piece(name: &str, rng: &mut SeededRng) -> Piece {
+pub(crate) fn piece(name: &str, rng: &mut SeededRng) -> Piece {
     let color = match find(name).map(|recipe| &recipe.colors[..]) {
         Some([]) => rng.pick(&ALL_COLORS),
         Some(colors) => rng.pick(colors),
@@ -240,7 +240,7 @@ fn find(name: &str) -> Option<&'static Recipe> {
 }
 
 /// Makes the piece of a name, with a random size in this paint.
-pub(in super::super) fn piece_in_paint(name: &str, main: Paint, rng: &mut SeededRng) -> Piece {
+pub(crate) fn piece_in_paint(name: &str, main: Paint, rng: &mut SeededRng) -> Piece {
     let mut mesh = Mesh::default();
     let Some(recipe) = find(name) else {
         let nothing = ThingKind {
@@ -270,7 +270,7 @@ pub(in super::super) fn piece_in_paint(name: &str, main: Paint, rng: &mut Seeded
 }
 
 /// Names of the things that are found at a place, such as `floor`.
-pub(in super::super) fn names_found_at(place: &str) -> Vec<&'static str> {
+pub(crate) fn names_found_at(place: &str) -> Vec<&'static str> {
     RECIPES
         .iter()
         .filter(|recipe| recipe.places.contains(&place))

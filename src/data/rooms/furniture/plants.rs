@@ -9,7 +9,7 @@ use super::super::seeded_rng::SeededRng;
 use super::super::surface::Surface;
 
 /// A plant in its pot, with its height in metres.
-pub(in super::super) fn plant(height: f32, rng: &mut SeededRng) -> Piece {
+pub(crate) fn plant(height: f32, rng: &mut SeededRng) -> Piece {
     let pot = Surface::paint(Paint::random(
         &["brown", "black", "grey", "orange", "blue"],
         rng,

@@ -11,7 +11,7 @@ use super::beds::cushion;
 use super::{FurnitureSet, add_legs};
 
 /// A chair with four legs and a back.
-pub(in super::super) fn chair(name: ThingKind, paint: Paint, rng: &mut SeededRng) -> Piece {
+pub(crate) fn chair(name: ThingKind, paint: Paint, rng: &mut SeededRng) -> Piece {
     let surface = if rng.chance(0.5) {
         Surface::wood(paint, 1)
     } else {
@@ -27,13 +27,13 @@ pub(in super::super) fn chair(name: ThingKind, paint: Paint, rng: &mut SeededRng
 
 /// Kind of back of a chair.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in super::super) enum ChairBack {
+pub(crate) enum ChairBack {
     Slats,
     Closed,
 }
 
 /// A chair with a given kind of back.
-pub(in super::super) fn chair_with_back(
+pub(crate) fn chair_with_back(
     name: ThingKind,
     paint: Paint,
     surface: &Surface,
@@ -70,7 +70,7 @@ pub(in super::super) fn chair_with_back(
 }
 
 /// A sofa for a number of people, with cushions.
-pub(in super::super) fn sofa(seats: usize, rng: &mut SeededRng) -> FurnitureSet {
+pub(crate) fn sofa(seats: usize, rng: &mut SeededRng) -> FurnitureSet {
     let paint = Paint::random(&COMMON_COLORS, rng);
     let mut set = FurnitureSet::from_piece(upholstered(kind("sofa", "sofa"), seats, paint, rng));
     let width = set.size.x;
@@ -89,7 +89,7 @@ pub(in super::super) fn sofa(seats: usize, rng: &mut SeededRng) -> FurnitureSet 
     set
 }
 
-pub(in super::super) fn armchair(rng: &mut SeededRng) -> Piece {
+pub(crate) fn armchair(rng: &mut SeededRng) -> Piece {
     let paint = Paint::random(&COMMON_COLORS, rng);
     upholstered(kind("armchair", "chair"), 1, paint, rng)
 }

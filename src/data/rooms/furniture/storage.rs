@@ -23,7 +23,7 @@ fn finish(paint: Paint) -> Surface {
 }
 
 /// A chest with a number of rows and columns of drawers.
-pub(in super::super) fn chest(
+pub(crate) fn chest(
     word: &'static str,
     size: Vec3,
     [rows, columns]: [usize; 2],
@@ -74,23 +74,13 @@ pub(in super::super) fn chest(
 }
 
 /// A cabinet in a random colour, with a number of doors side by side.
-pub(in super::super) fn cabinet(
-    name: ThingKind,
-    size: Vec3,
-    doors: usize,
-    rng: &mut SeededRng,
-) -> Piece {
+pub(crate) fn cabinet(name: ThingKind, size: Vec3, doors: usize, rng: &mut SeededRng) -> Piece {
     let paint = Paint::random(&COLORS, rng);
     cabinet_in_paint(name, size, doors, paint)
 }
 
 /// A cabinet in a paint, with a number of doors side by side.
-pub(in super::super) fn cabinet_in_paint(
-    name: ThingKind,
-    size: Vec3,
-    doors: usize,
-    paint: Paint,
-) -> Piece {
+pub(crate) fn cabinet_in_paint(name: ThingKind, size: Vec3, doors: usize, paint: Paint) -> Piece {
     let half = size.x / 2.0;
     let surface = if paint.name == "brown" {
         Surface::wood(paint, 1)
@@ -153,7 +143,7 @@ pub(in super::super) fn cabinet_in_paint(
 }
 
 /// Shelves with books and boxes on them.
-pub(in super::super) fn bookshelf(rng: &mut SeededRng) -> Piece {
+pub(crate) fn bookshelf(rng: &mut SeededRng) -> Piece {
     let paint = Paint::random(&["brown", "grey", "black"], rng);
     let surface = Surface::wood(paint, 1);
     let (width, height, depth) = (rng.between(0.8, 1.2), rng.between(1.6, 2.0), 0.3);
@@ -206,7 +196,7 @@ fn add_books(mesh: &mut Mesh, [from, to]: [f32; 2], y: f32, rise: f32, rng: &mut
 }
 
 /// A wall shelf with a few books. Its back is at the wall, and its board at y = 0.
-pub(in super::super) fn wall_shelf(rng: &mut SeededRng) -> Piece {
+pub(crate) fn wall_shelf(rng: &mut SeededRng) -> Piece {
     let paint = Paint::random(
         &["white", "brown", "black", "blue", "green", "yellow", "red"],
         rng,

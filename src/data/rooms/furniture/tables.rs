@@ -23,7 +23,7 @@ fn finish(paint: Paint) -> Surface {
 }
 
 /// A table of a size, with four legs.
-pub(in super::super) fn table(name: ThingKind, size: Vec3, rng: &mut SeededRng) -> Piece {
+pub(crate) fn table(name: ThingKind, size: Vec3, rng: &mut SeededRng) -> Piece {
     let paint = Paint::random(&COLORS, rng);
     let surface = finish(paint);
     let mut mesh = Mesh::default();
@@ -45,12 +45,7 @@ pub(in super::super) fn table(name: ThingKind, size: Vec3, rng: &mut SeededRng) 
 }
 
 /// A round table on one foot.
-pub(in super::super) fn round(
-    name: ThingKind,
-    radius: f32,
-    height: f32,
-    rng: &mut SeededRng,
-) -> Piece {
+pub(crate) fn round(name: ThingKind, radius: f32, height: f32, rng: &mut SeededRng) -> Piece {
     let paint = Paint::random(&COLORS, rng);
     let surface = finish(paint);
     let mut mesh = Mesh::default();

@@ -11,7 +11,7 @@ use super::super::surface::Surface;
 
 /// The two curtains at the sides of a window of a width, from y = 0 downwards. Each is one thing; the rod belongs to the
 /// first.
-pub(in super::super) fn curtains(window: f32, drop: f32, rng: &mut SeededRng) -> [Piece; 2] {
+pub(crate) fn curtains(window: f32, drop: f32, rng: &mut SeededRng) -> [Piece; 2] {
     let paint = Paint::random(&COMMON_COLORS, rng);
     let cloth = Surface::fabric(paint, rng);
     let width = rng.between(0.42, 0.6);
@@ -30,7 +30,7 @@ pub(in super::super) fn curtains(window: f32, drop: f32, rng: &mut SeededRng) ->
 }
 
 /// A towel over a rail on the wall, with the rail at y = 0.
-pub(in super::super) fn towel(rng: &mut SeededRng) -> Piece {
+pub(crate) fn towel(rng: &mut SeededRng) -> Piece {
     let paint = Paint::random(&COMMON_COLORS, rng);
     let cloth = Surface::paint(paint).with_pattern(Pattern::Pile);
     let (width, drop) = (rng.between(0.36, 0.5), rng.between(0.55, 0.75));
@@ -64,7 +64,7 @@ pub(in super::super) fn towel(rng: &mut SeededRng) -> Piece {
 }
 
 /// A rug of a size, with its center at the origin.
-pub(in super::super) fn rug(width: f32, depth: f32, rng: &mut SeededRng) -> Piece {
+pub(crate) fn rug(width: f32, depth: f32, rng: &mut SeededRng) -> Piece {
     let tints = [
         [136, 74, 62],
         [78, 92, 116],

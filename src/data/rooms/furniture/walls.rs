@@ -40,7 +40,7 @@ fn add_sheet(mesh: &mut Mesh, width: f32, height: f32, z: f32, surface: &Surface
     );
 }
 
-pub(in super::super) fn picture(rng: &mut SeededRng) -> Piece {
+pub(crate) fn picture(rng: &mut SeededRng) -> Piece {
     let width = rng.between(0.25, 0.9);
     let height = (width * rng.between(0.6, 1.35)).min(0.75);
     let wood = Surface::paint(Paint::random(&["black", "brown", "grey"], rng));
@@ -53,7 +53,7 @@ pub(in super::super) fn picture(rng: &mut SeededRng) -> Piece {
 }
 
 /// A framed mirror. `width` and `height` exclude the frame.
-pub(in super::super) fn mirror(width: f32, height: f32, rng: &mut SeededRng) -> Piece {
+pub(crate) fn mirror(width: f32, height: f32, rng: &mut SeededRng) -> Piece {
     let rim = Surface::gloss(Paint::random(&["black", "brown", "grey"], rng));
     let glass = Surface::plain([255, 255, 255]).with_finish(SurfaceFinish::Mirror);
     let mut mesh = Mesh::default();
@@ -63,12 +63,12 @@ pub(in super::super) fn mirror(width: f32, height: f32, rng: &mut SeededRng) -> 
 }
 
 /// A flat television, with or without a foot.
-pub(in super::super) fn television(width: f32, foot: bool) -> Piece {
+pub(crate) fn television(width: f32, foot: bool) -> Piece {
     flat_screen_piece(kind("tv", "tv_monitor"), width, foot)
 }
 
 /// A computer monitor with a foot.
-pub(in super::super) fn monitor(width: f32) -> Piece {
+pub(crate) fn monitor(width: f32) -> Piece {
     flat_screen_piece(kind("monitor", "tv_monitor"), width, true)
 }
 
@@ -96,7 +96,7 @@ fn flat_screen_piece(name: ThingKind, width: f32, foot: bool) -> Piece {
 }
 
 /// A window with the lower edge of the pane at y = 0. `daylight` is the radiance of the incoming light.
-pub(in super::super) fn window(width: f32, height: f32, daylight: f32) -> Piece {
+pub(crate) fn window(width: f32, height: f32, daylight: f32) -> Piece {
     let half = width / 2.0;
     let white = Surface::plain([240, 240, 238]);
     let view = Surface {
@@ -127,7 +127,7 @@ pub(in super::super) fn window(width: f32, height: f32, daylight: f32) -> Piece 
 
 /// Blinds in front of a window of this width and height, with the lower edge of the pane at y = 0. `share` is the covered part of the
 /// height, in 0..1.
-pub(in super::super) fn blinds(width: f32, height: f32, share: f32, rng: &mut SeededRng) -> Piece {
+pub(crate) fn blinds(width: f32, height: f32, share: f32, rng: &mut SeededRng) -> Piece {
     let half = width / 2.0;
     let paint = Paint::random(
         &[
@@ -155,7 +155,7 @@ pub(in super::super) fn blinds(width: f32, height: f32, share: f32, rng: &mut Se
 }
 
 /// A door with a frame. The leaf is opened by `angle` into the room behind the wall.
-pub(in super::super) fn door([width, height]: [f32; 2], angle: f32, rng: &mut SeededRng) -> Piece {
+pub(crate) fn door([width, height]: [f32; 2], angle: f32, rng: &mut SeededRng) -> Piece {
     let frame_surface = Surface::plain(rng.pick(&[[196, 192, 182], [92, 64, 44], [150, 146, 138]]));
     let half = width / 2.0;
     let mut mesh = Mesh::default();

@@ -207,7 +207,7 @@ pub(super) fn empty_choice_alerts(combined: &Combined) -> Vec<Alert> {
 }
 
 /// One alert for each model with empty answers to open questions ([`empty_alerts`]).
-pub(in crate::report::joined) fn empty_answer_alerts(records: &[Record<OpenDetail>]) -> Vec<Alert> {
+pub(crate) fn empty_answer_alerts(records: &[Record<OpenDetail>]) -> Vec<Alert> {
     empty_alerts(
         records
             .iter()

@@ -18,7 +18,7 @@ pub(super) struct RowNeighbours {
 
 /// Sums over neighbours in a pair of frames, by plane.
 #[derive(Debug)]
-pub(in crate::commands::calibrate) struct NeighbourSums {
+pub(crate) struct NeighbourSums {
     planes: Vec<PlaneSums>,
 }
 
@@ -116,7 +116,7 @@ impl NeighbourSums {
 
     /// Correlation of neighbours of a plane within rows of A − ratio · B, which is 0 for independent noise. `ratios` are the light of A
     /// over the light of B, by plane.
-    pub(in crate::commands::calibrate) fn correlation(&self, ratios: &[f64]) -> f64 {
+    pub(crate) fn correlation(&self, ratios: &[f64]) -> f64 {
         let [mut products, mut squares, mut sites, mut rows] = [0.0; 4];
         for (plane, ratio) in self.planes.iter().zip(ratios) {
             products += plane.products.squared_difference(*ratio);

@@ -10,7 +10,7 @@ pub(super) struct Products {
 
 /// Sums of products of A and B around their means. They give the sum of squares of A − ratio · B for any ratio.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(in crate::commands::calibrate) struct Scatter {
+pub(crate) struct Scatter {
     pub(super) aa: f64,
     pub(super) ab: f64,
     pub(super) bb: f64,
@@ -74,7 +74,7 @@ impl Scatter {
     }
 
     /// Sum of D² around its mean, with D = A − ratio · B; for products of neighbours, the sum of D · D′.
-    pub(in crate::commands::calibrate) fn squared_difference(self, ratio: f64) -> f64 {
+    pub(crate) fn squared_difference(self, ratio: f64) -> f64 {
         self.aa - 2.0 * ratio * self.ab + ratio * ratio * self.bb
     }
 }
